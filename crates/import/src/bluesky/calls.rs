@@ -1,7 +1,7 @@
 //! Files that a scenario calls, which lie in its folder.
 
 use super::MAX_SCN_BYTES;
-use sidestep_scenario::file::read_text;
+use super::text::ScnText;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
@@ -19,7 +19,7 @@ const MAX_FOLDER_ENTRIES: usize = 100_000;
 #[derive(Debug, Default)]
 pub(super) struct CallFolder {
     folder: Option<PathBuf>,
-    texts: BTreeMap<PathBuf, Rc<str>>,
+    texts: BTreeMap<PathBuf, Rc<ScnText>>,
     bytes: u64,
 }
 
@@ -44,7 +44,7 @@ impl CallFolder {
     pub(super) fn read(
         &mut self,
         name: &str,
-    ) -> Result<(PathBuf, Rc<str>), (String, &'static str)> {
+    ) -> Result<(PathBuf, Rc<ScnText>), (String, &'static str)> {
         let Some(folder) = &self.folder else {
             return Err((
                 format!("`{name}` is not read, for this text has no folder"),
@@ -55,15 +55,15 @@ impl CallFolder {
         if let Some(text) = self.texts.get(&path) {
             return Ok((path, Rc::clone(text)));
         }
-        let text = read_text(&path, MAX_SCN_BYTES).map_err(|error| {
+        let text = ScnText::read(&path, MAX_SCN_BYTES).map_err(|error| {
             (format!("`{name}` cannot be read: {}", error.cause()), "check the file")
         })?;
-        self.bytes += text.len() as u64;
+        self.bytes += text.text.len() as u64;
         if self.bytes > MAX_SCN_BYTES {
             let cause = format!("the files called have more than {MAX_SCN_BYTES} bytes");
             return Err((cause, "call fewer"));
         }
-        let text: Rc<str> = text.into();
+        let text = Rc::new(text);
         self.texts.insert(path.clone(), Rc::clone(&text));
         Ok((path, text))
     }

@@ -13,6 +13,7 @@ use super::calls::CallFolder;
 use super::lines::{CommandFile, CommandText};
 use super::navdata::NavigationData;
 use super::schedule::Schedule;
+use super::text::ScnText;
 use super::traffic::{AircraftCommand, ScnAircraft, UnplacedAircraft};
 use super::values::Arguments;
 use super::{Airspeed, DISPLAY_RULE, ScnFile, UnusedCommand};
@@ -142,7 +143,7 @@ impl Interpreter {
     }
 
     /// Carries out the commands of a text, which is `name` in errors.
-    pub(super) fn run(mut self, name: &str, text: &str) -> ScnFile {
+    pub(super) fn run(mut self, name: &str, text: &ScnText) -> ScnFile {
         self.result.report = ImportReport::new("BlueSky scenario (.scn)");
         let file = CommandFile { name: name.to_string(), prefix: String::new(), depth: 0 };
         self.add_file(Rc::new(file), text, &[], 0.0);

@@ -26,6 +26,9 @@ mod speed;
 mod synthetic;
 #[cfg(test)]
 pub(super) mod tests;
+mod text;
+#[cfg(test)]
+mod text_tests;
 mod traffic;
 mod values;
 
@@ -46,7 +49,7 @@ use super::report::ImportReport;
 use calls::CallFolder;
 use interpreter::Interpreter;
 use sidestep_kernel::InputError;
-use sidestep_scenario::file::read_text;
+use text::ScnText;
 
 /// The rule of a report for commands that have no effect on what flies.
 pub const DISPLAY_RULE: &str = "commands that change or ask a display only";
@@ -128,12 +131,13 @@ pub fn read_with(path: &Path, options: &ScnOptions) -> Result<ScnFile, InputErro
 /// # Errors
 /// When it cannot be read; errors in its text are listed in the result.
 pub fn read_with_places(path: &Path, places: &Arc<NavigationData>) -> Result<ScnFile, InputError> {
-    let text = read_text(path, MAX_SCN_BYTES)?;
+    let text = ScnText::read(path, MAX_SCN_BYTES)?;
     let folder = CallFolder::of_file(path);
     Ok(Interpreter::new(folder, Arc::clone(places)).run(&path.display().to_string(), &text))
 }
 
 /// Parses the text of a scenario; `place` is its name in errors. Files that it calls are not read.
 pub fn parse(place: &dyn fmt::Display, text: &str) -> ScnFile {
-    Interpreter::new(CallFolder::nowhere(), Arc::default()).run(&place.to_string(), text)
+    let text = ScnText { text: text.to_owned(), ..ScnText::default() };
+    Interpreter::new(CallFolder::nowhere(), Arc::default()).run(&place.to_string(), &text)
 }

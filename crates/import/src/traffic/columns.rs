@@ -21,6 +21,8 @@ const KT_PER_MPH: f64 = 1609.344 / NAUTICAL_MILE_M;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Field {
     Time,
+    /// A time that is UTC by the name of its column, where another column may have local times.
+    UtcTime,
     Address,
     Callsign,
     FlightId,
@@ -45,9 +47,10 @@ pub(super) enum Field {
 }
 
 /// Number of [`Field`]s.
-const FIELD_COUNT: usize = 15;
+const FIELD_COUNT: usize = 16;
 
-/// A column by its name, with the factor that turns its numbers into the unit of the field.
+/// A column by its name, with the factor that turns its numbers into the unit of the field. Of times it is the number of
+/// units in a second.
 pub(super) type NamedColumn = (&'static str, Field, f64);
 
 /// A source of recorded traffic.
@@ -59,6 +62,8 @@ pub(super) enum Source {
     Flightradar24,
     /// The decoder readsb, and the networks that give its JSON: adsb.lol, ADS-B Exchange, adsb.fi, airplanes.live.
     Readsb,
+    /// The program Virtual Radar Server, whose JSON was that of ADS-B Exchange until 2020.
+    VirtualRadar,
     /// The interface AeroAPI of FlightAware.
     FlightAware,
     /// Messages of BaseStation, which decoders give on port 30003.
@@ -89,6 +94,12 @@ impl Source {
         if has("alt_baro") && has_any(&["hex", "icao", "icao24"]) {
             return Self::Readsb;
         }
+        if has("hex") && has("altitude") && has_any(&["seen_pos", "vert_rate"]) {
+            return Self::Readsb;
+        }
+        if has("icao") && has("postime") {
+            return Self::VirtualRadar;
+        }
         if has("fa_flight_id") {
             return Self::FlightAware;
         }
@@ -108,6 +119,7 @@ impl Source {
             Self::Flightradar24 => FLIGHTRADAR24,
             Self::FlightPoints => FLIGHT_POINTS,
             Self::Readsb => READSB,
+            Self::VirtualRadar => VIRTUAL_RADAR,
             Self::FlightAware => FLIGHT_AWARE,
             Self::Segments | Self::Encounter | Self::BaseStation => &[],
         }
@@ -123,6 +135,9 @@ impl Source {
             }
             Self::Flightradar24 => ("Flightradar24 track", "altitude ft, speed kt"),
             Self::Readsb => ("aircraft of readsb", "altitude ft, speed kt, vertical speed ft/min"),
+            Self::VirtualRadar => {
+                ("aircraft of Virtual Radar Server", "altitude ft, speed kt, vertical speed ft/min")
+            }
             Self::FlightAware => ("positions of FlightAware", "altitude 100 ft, speed kt"),
             Self::BaseStation => {
                 ("messages of BaseStation", "altitude ft, speed kt, vertical speed ft/min")
@@ -159,6 +174,11 @@ const OPENSKY: &[NamedColumn] = &[
     ("lastposupdate", Field::PositionTime, 1.0),
     ("time_position", Field::PositionTime, 1.0),
     ("last_position", Field::PositionTime, 1.0),
+    // States that were written one by one have no other time.
+    ("time_position", Field::Time, 1.0),
+    ("lastposupdate", Field::Time, 1.0),
+    ("last_contact", Field::Time, 1.0),
+    ("lastcontact", Field::Time, 1.0),
 ];
 
 const TRAFFIC_LIBRARY: &[NamedColumn] = &[
@@ -174,6 +194,7 @@ const TRAFFIC_LIBRARY: &[NamedColumn] = &[
     ("track", Field::Track, 1.0),
     ("vertical_rate", Field::VerticalSpeed, 1.0),
     ("onground", Field::OnGround, 1.0),
+    ("on_ground", Field::OnGround, 1.0),
     ("last_position", Field::PositionTime, 1.0),
 ];
 
@@ -202,6 +223,7 @@ const FLIGHTRADAR24: &[NamedColumn] = &[
     ("gspeed", Field::GroundSpeed, 1.0),
     ("track", Field::Track, 1.0),
     ("vspeed", Field::VerticalSpeed, 1.0),
+    ("on_ground", Field::OnGround, 1.0),
 ];
 
 /// Names of readsb's JSON. Source: readsb, README-json.md.
@@ -223,6 +245,26 @@ const READSB: &[NamedColumn] = &[
     ("baro_rate", Field::VerticalSpeed, 1.0),
     ("geom_rate", Field::VerticalSpeed, 1.0),
     ("seen_pos", Field::PositionAge, 1.0),
+    // Names of its predecessor dump1090.
+    ("altitude", Field::Altitude, 1.0),
+    ("speed", Field::GroundSpeed, 1.0),
+    ("vert_rate", Field::VerticalSpeed, 1.0),
+];
+
+/// Names of Virtual Radar Server, which the archive of ADS-B Exchange has as well. Source: "AircraftList.json",
+/// virtualradarserver.co.uk.
+const VIRTUAL_RADAR: &[NamedColumn] = &[
+    ("postime", Field::Time, 1e3),
+    ("icao", Field::Address, 1.0),
+    ("call", Field::Callsign, 1.0),
+    ("lat", Field::Latitude, 1.0),
+    ("long", Field::Longitude, 1.0),
+    ("lon", Field::Longitude, 1.0),
+    ("alt", Field::Altitude, 1.0),
+    ("spd", Field::GroundSpeed, 1.0),
+    ("trak", Field::Track, 1.0),
+    ("vsi", Field::VerticalSpeed, 1.0),
+    ("gnd", Field::OnGround, 1.0),
 ];
 
 /// Names of AeroAPI, whose altitudes are in hundreds of feet. Source: AeroAPI, `/flights/{id}/track`.
@@ -239,14 +281,21 @@ const FLIGHT_AWARE: &[NamedColumn] = &[
 
 const OWN: &[NamedColumn] = &[
     ("time_s", Field::Time, 1.0),
-    ("time_ms", Field::Time, 1.0),
-    ("time_us", Field::Time, 1.0),
-    ("time_ns", Field::Time, 1.0),
+    ("time_ms", Field::Time, 1e3),
+    ("time_us", Field::Time, 1e6),
+    ("time_ns", Field::Time, 1e9),
+    ("timestamp_s", Field::Time, 1.0),
+    ("timestamp_ms", Field::Time, 1e3),
+    ("timestamp_us", Field::Time, 1e6),
+    ("timestamp_ns", Field::Time, 1e9),
     ("time", Field::Time, 1.0),
     ("timestamp", Field::Time, 1.0),
-    ("time_utc", Field::Time, 1.0),
-    ("utc", Field::Time, 1.0),
     ("datetime", Field::Time, 1.0),
+    ("time_utc", Field::UtcTime, 1.0),
+    ("timestamp_utc", Field::UtcTime, 1.0),
+    ("datetime_utc", Field::UtcTime, 1.0),
+    ("utc_time", Field::UtcTime, 1.0),
+    ("utc", Field::UtcTime, 1.0),
     ("icao24", Field::Address, 1.0),
     ("icao", Field::Address, 1.0),
     ("icao_address", Field::Address, 1.0),
@@ -281,6 +330,9 @@ const OWN: &[NamedColumn] = &[
     ("ground_speed_kt", Field::GroundSpeed, 1.0),
     ("speed_kt", Field::GroundSpeed, 1.0),
     ("gs_m_s", Field::GroundSpeed, KT_PER_M_S),
+    ("groundspeed_m_s", Field::GroundSpeed, KT_PER_M_S),
+    ("groundspeed_km_h", Field::GroundSpeed, KT_PER_KM_H),
+    ("ground_speed_km_h", Field::GroundSpeed, KT_PER_KM_H),
     ("gs_mps", Field::GroundSpeed, KT_PER_M_S),
     ("ground_speed_m_s", Field::GroundSpeed, KT_PER_M_S),
     ("speed_m_s", Field::GroundSpeed, KT_PER_M_S),
@@ -296,10 +348,15 @@ const OWN: &[NamedColumn] = &[
     ("heading", Field::Track, 1.0),
     ("vs_fpm", Field::VerticalSpeed, 1.0),
     ("vertical_rate_fpm", Field::VerticalSpeed, 1.0),
+    ("vertical_speed_fpm", Field::VerticalSpeed, 1.0),
     ("vs_m_s", Field::VerticalSpeed, FPM_PER_M_S),
     ("vertical_rate_m_s", Field::VerticalSpeed, FPM_PER_M_S),
+    ("vertical_speed_m_s", Field::VerticalSpeed, FPM_PER_M_S),
     ("onground", Field::OnGround, 1.0),
     ("on_ground", Field::OnGround, 1.0),
+    ("is_on_ground", Field::OnGround, 1.0),
+    ("ground", Field::OnGround, 1.0),
+    ("gnd", Field::OnGround, 1.0),
 ];
 
 /// Where a field is in a row.
@@ -317,12 +374,15 @@ pub(super) struct Layout {
     columns: [Option<Column>; FIELD_COUNT],
     /// The columns that this program does not use.
     pub(super) unused: Vec<String>,
+    /// Names of used columns that the header has again.
+    pub(super) repeated: Vec<String>,
 }
 
 impl Layout {
     /// Returns a layout with the given columns.
     pub(super) fn new(source: Source, columns: &[(Field, usize, f64)]) -> Self {
-        let mut layout = Self { source, columns: [None; FIELD_COUNT], unused: Vec::new() };
+        let mut layout =
+            Self { source, columns: [None; FIELD_COUNT], unused: Vec::new(), repeated: Vec::new() };
         for &(field, index, factor) in columns {
             layout.columns[field as usize] = Some(Column { index, factor });
         }
@@ -346,8 +406,14 @@ impl Layout {
                 used[index] = true;
             }
         }
-        let unused = header.iter().zip(used).filter(|(name, used)| !used && !name.is_empty());
-        layout.unused = unused.map(|(name, _)| name.clone()).collect();
+        for (k, name) in names.iter().enumerate() {
+            if used[k] || name.is_empty() {
+                continue;
+            }
+            let is_repeated = names[..k].iter().zip(&used).any(|(one, used)| *used && one == name);
+            let list = if is_repeated { &mut layout.repeated } else { &mut layout.unused };
+            list.push(header[k].clone());
+        }
         layout.check(place, &names)?;
         Ok(layout)
     }
@@ -386,7 +452,7 @@ impl Layout {
     fn missing_fields(&self) -> Vec<&'static str> {
         let has = |field: Field| self.column(field).is_some();
         let mut missing = Vec::new();
-        if !has(Field::Time) {
+        if !has(Field::Time) && !has(Field::UtcTime) {
             missing.push("a time (`time_s`)");
         }
         // A track of Flightradar24 is of one aircraft.
@@ -425,10 +491,35 @@ const COLUMN_REMEDY: &str = "give each column the name of what it holds, with th
 /// Largest number of columns that an error lists.
 const MAX_LISTED: usize = 16;
 
-/// Returns the name of a column without the differences that mean nothing.
+/// Returns the name of a column without the differences that mean nothing: `Altitude [ft]` is `altitude_ft`.
 fn plain_name(name: &str) -> String {
-    name.trim().to_ascii_lowercase().replace([' ', '-'], "_")
+    let name = name.trim().to_ascii_lowercase();
+    let in_brackets = name.strip_suffix([']', ')']).and_then(|rest| rest.split_once(['[', '(']));
+    let (quantity, unit) = match in_brackets {
+        Some((quantity, unit)) => (quantity.trim_end(), unit.trim()),
+        None => name.rsplit_once(['_', ' ']).unwrap_or((&name, "")),
+    };
+    let known = UNIT_NAMES.iter().find(|(_, others)| others.contains(&unit));
+    let name = match known {
+        Some((unit, _)) => format!("{quantity}_{unit}"),
+        None if in_brackets.is_some() => format!("{quantity}_{unit}"),
+        None => name,
+    };
+    name.replace([' ', '-'], "_")
 }
+
+/// Units as names of columns have them here, and what others write for them.
+const UNIT_NAMES: [(&str, &[&str]); 9] = [
+    ("ft", &["feet", "foot"]),
+    ("m", &["meter", "meters", "metre", "metres"]),
+    ("deg", &["degree", "degrees", "\u{b0}"]),
+    ("kt", &["kts", "kn", "knot", "knots"]),
+    ("m_s", &["m/s", "mps"]),
+    ("km_h", &["km/h", "kmh", "kph"]),
+    ("fpm", &["ft/min"]),
+    ("s", &["sec", "second", "seconds"]),
+    ("ms", &["millisecond", "milliseconds"]),
+];
 
 #[cfg(test)]
 mod tests {
@@ -450,6 +541,9 @@ mod tests {
             ("fr24_id,hex,callsign,lat,lon,track,alt,gspeed,timestamp", Source::Flightradar24),
             ("now,hex,flight,lat,lon,alt_baro,alt_geom,gs,track,seen_pos", Source::Readsb),
             ("fa_flight_id,altitude,groundspeed,latitude,longitude,timestamp", Source::FlightAware),
+            ("now,hex,flight,lat,lon,altitude,speed,track,vert_rate", Source::Readsb),
+            ("Icao,Call,Lat,Long,Alt,Spd,Trak,PosTime,Gnd", Source::VirtualRadar),
+            ("icao24,time_position,longitude,latitude,baro_altitude,velocity", Source::OpenSky),
         ] {
             assert_eq!(layout(header).expect(header).source, source, "{header}");
         }
@@ -465,6 +559,28 @@ mod tests {
         let metric = layout("time_s,callsign,lat,lon,Alt_M,speed_km_h").unwrap();
         assert!((metric.altitude().unwrap().factor * 304.8 - 1000.0).abs() < 1e-9);
         assert!((metric.column(Field::GroundSpeed).unwrap().factor * 185.2 - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn units_in_brackets_or_spelled_out_are_those_of_the_column() {
+        for header in [
+            "Time [s],Callsign,Latitude [deg],Longitude [deg],Altitude [m],Ground speed [km/h]",
+            "time(s),callsign,lat(\u{b0}),lon(\u{b0}),alt (meters),speed_kph",
+            "time_seconds,callsign,lat_degrees,lon_degrees,altitude metres,gs_km_h",
+        ] {
+            let found = layout(header).expect(header);
+            assert_eq!(found.unused, [""; 0], "{header}");
+            assert!((found.altitude().unwrap().factor * 304.8 - 1000.0).abs() < 1e-9, "{header}");
+            let speed = found.column(Field::GroundSpeed).unwrap();
+            assert!((speed.factor * 185.2 - 100.0).abs() < 1e-9, "{header}");
+        }
+        assert!(layout("time,callsign,lat,lon,altitude [cubits]").is_err());
+    }
+
+    #[test]
+    fn a_column_that_is_there_twice_is_named() {
+        let found = layout("time,callsign,lat,lon,alt_ft,lat").unwrap();
+        assert_eq!((found.repeated, found.unused), (vec!["lat".to_owned()], Vec::new()));
     }
 
     #[test]

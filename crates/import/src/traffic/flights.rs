@@ -7,12 +7,14 @@ use super::rows::{
     CheckedRows, Row, RowCollector, SAME_INSTANT_RULE, UNREACHED_RULE, UNUSED_COLUMNS_RULE,
     aircraft_key, remedy_of,
 };
+use super::standing::stands_by_rows;
 use super::summary::describe;
 use super::time::format_utc;
 use super::{MAX_SPEED_M_S, RecordedTraffic, Track};
 use crate::report::{ImportReport, MAX_PLACES, Treatment};
 use sidestep_kernel::InputError;
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The longest time in s on the ground, between two rows in the air, within one flight: a flag that was wrong for a
 /// moment ends no flight.
@@ -30,6 +32,10 @@ const MAX_TYPICAL_SPEED_M_S: f64 = 2_600.0;
 
 /// What units of speed may differ from the one that a column says.
 const UNIT_RATIOS: std::ops::RangeInclusive<f64> = 0.25..=4.0;
+
+/// The greatest ratio of the speeds of rows to those that they report where positions are in radians: pi over 180, and
+/// more where meridians come together.
+const MAX_RADIAN_RATIO: f64 = 0.1;
 
 /// What reported directions may differ from those of rows, in degrees: in the median, no wind does that.
 const MAX_DIRECTION_OFFSET_DEG: f64 = 45.0;
@@ -197,8 +203,9 @@ impl FlightBuilder<'_> {
         let mut kept: Vec<Row> = Vec::with_capacity(rows.len());
         let mut ends = Vec::new();
         let mut has_landed = false;
-        for row in rows {
-            let is_slow = row.sample.ground_speed_kt.is_some_and(|kt| kt < limit_kt);
+        let stands = stands_by_rows(&rows, limit_kt, self.options.max_gap_s);
+        for (row, stands) in rows.into_iter().zip(stands) {
+            let is_slow = row.sample.ground_speed_kt.map_or(stands, |kt| kt < limit_kt);
             match row.is_on_ground {
                 Some(true) => {
                     let rule = "rows of aircraft on the ground, which are no traffic";
@@ -295,6 +302,13 @@ impl FlightBuilder<'_> {
     fn check_speed_unit(&mut self, flights: &[Vec<Row>]) -> f64 {
         let ratio = plausibility::speed_ratio(flights.iter()).unwrap_or(1.0);
         if SPEED_RATIOS.contains(&ratio) {
+            return 1.0;
+        }
+        if ratio < MAX_RADIAN_RATIO && flights.iter().flatten().all(is_in_radians) {
+            let rule = format!(
+                "rows move at {ratio:.3} times of the speeds that they report: positions may be in radians"
+            );
+            self.report.record(Treatment::Suspicious, &rule, "", "write positions in degrees");
             return 1.0;
         }
         let rule = format!(
@@ -458,6 +472,11 @@ impl FlightBuilder<'_> {
         let remedy = "give a recording of aircraft in the air, each in two rows at least";
         InputError::new(place, cause, remedy)
     }
+}
+
+fn is_in_radians(row: &Row) -> bool {
+    let position = row.sample.position;
+    position.lat_deg.abs() <= FRAC_PI_2 && position.lon_deg.abs() <= PI
 }
 
 /// Returns whether every aircraft has one row: with more, rows that are far apart are no picture of one instant.

@@ -4,6 +4,7 @@
 
 use super::POINTS_REMEDY;
 use super::columns::{Field, Layout, Source};
+use super::json_frames::rows_of;
 use super::json_items::{Broken, Item, JsonItems};
 use super::rows::{RowCollector, RowValues};
 use super::value::Value;
@@ -40,9 +41,9 @@ const STATE_KEYS: [&str; 18] = [
 const PATH_KEYS: [&str; 6] =
     ["time", "latitude", "longitude", "baro_altitude", "true_track", "on_ground"];
 
-/// Names of lists of rows within an object: of readsb, of the networks that give its rows, of Flightradar24, of
-/// FlightAware.
-const LIST_KEYS: [&str; 5] = ["aircraft", "ac", "data", "tracks", "positions"];
+/// Names of lists of rows within an object: of readsb, of the networks that give its rows, of Virtual Radar Server, of
+/// Flightradar24, of FlightAware.
+const LIST_KEYS: [&str; 6] = ["aircraft", "ac", "acList", "data", "tracks", "positions"];
 
 /// Names of values beside such a list that each of its rows has.
 const SHARED_KEYS: [&str; 8] =
@@ -193,6 +194,13 @@ impl StateReader<'_> {
         if map.get("type").is_some_and(|kind| kind == "FeatureCollection" || kind == "Feature") {
             return Err(InputError::new(self.collector.place(), GEO_JSON_CAUSE, POINTS_REMEDY));
         }
+        map = match rows_of(map) {
+            Ok(rows) => {
+                self.records.extend(rows);
+                return Ok(());
+            }
+            Err(map) => map,
+        };
         if let Some(Json::Array(points)) = map.get_mut("trace").map(Json::take) {
             self.push_trace(&map, points);
             return Ok(());

@@ -27,22 +27,26 @@ mod columns;
 mod csv_source;
 mod daa;
 mod flights;
+mod json_frames;
 mod json_items;
 mod json_source;
 #[cfg(test)]
 mod json_tests;
 mod named;
 mod options;
+#[cfg(test)]
+mod other_tests;
 mod parquet_source;
 #[cfg(test)]
 mod parquet_tests;
 mod plausibility;
 mod rows;
 mod so6;
+mod standing;
 mod summary;
 #[cfg(test)]
 mod tests;
-mod text;
+pub(crate) mod text;
 mod time;
 mod value;
 #[cfg(test)]
@@ -118,6 +122,33 @@ pub const MAX_TRAFFIC_BYTES: u64 = super::table::MAX_CSV_BYTES;
 /// What to give in place of a file for maps.
 const POINTS_REMEDY: &str = "give a table with a row for each point: `time_s`, `callsign`, `lat_deg`, `lon_deg`, `alt_m` \
                              (heights in KML, GPX and GeoJSON are in meters)";
+
+impl Track {
+    /// Returns its median speed over the ground over time, in m/s: that of its rows, whatever they report. A jump takes
+    /// one step, and changes it little.
+    pub fn median_speed_m_s(&self) -> Option<f64> {
+        let step = |pair: &[Sample]| {
+            let length_m = plausibility::distance_m(pair[0].position, pair[1].position);
+            let step_s = pair[1].time_s - pair[0].time_s;
+            [length_m / step_s, step_s]
+        };
+        weighted_median(self.samples.windows(2).map(step).collect())
+    }
+}
+
+/// Returns the value of pairs of value and weight below which half of the weight lies.
+fn weighted_median(mut pairs: Vec<[f64; 2]>) -> Option<f64> {
+    pairs.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let half = 0.5 * pairs.iter().map(|[_, weight]| weight).sum::<f64>();
+    let mut below = 0.0;
+    pairs
+        .iter()
+        .find(|[_, weight]| {
+            below += weight;
+            below >= half
+        })
+        .map(|[value, _]| *value)
+}
 
 /// Reads a file, plain or compressed with gzip.
 ///

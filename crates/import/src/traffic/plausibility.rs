@@ -6,6 +6,7 @@
 
 use super::columns::{FOOT_M, NAUTICAL_MILE_M};
 use super::rows::{Row, median};
+use super::weighted_median;
 use crate::local_plane::{EARTH_RADIUS_M, LatLon};
 use sidestep_kernel::math;
 
@@ -138,11 +139,11 @@ impl Stretch {
     }
 
     /// Returns the ratio of both lengths; `None` where one of them says nothing: within a gap an aircraft may turn, and
-    /// a short way is mostly noise.
+    /// two short ways are mostly noise.
     fn ratio(self) -> Option<f64> {
         let is_telling = !self.is_incomplete
             && self.duration_s <= 4.0 * MIN_STRETCH_S
-            && self.length_m > TOLERANCE_M
+            && self.length_m.max(self.reported_m) > TOLERANCE_M
             && self.reported_m > 0.0;
         is_telling.then(|| self.length_m / self.reported_m)
     }
@@ -162,14 +163,16 @@ pub(super) fn suspicions(rows: &[Row], speed_ratio: f64) -> Vec<Option<Suspicion
     found
 }
 
-/// Returns the median speed between rows.
+/// Returns the median speed of a flight over time: it is slower for half of its time. Rows that follow within a fraction
+/// of a second, as of two receivers, say little.
 pub(super) fn typical_speed_m_s(rows: &[Row]) -> f64 {
-    let mut speeds: Vec<f64> = Vec::with_capacity(rows.len());
+    let mut steps: Vec<[f64; 2]> = Vec::with_capacity(rows.len());
     for pair in rows.windows(2) {
         let length_m = distance_m(pair[0].sample.position, pair[1].sample.position);
-        speeds.push(length_m / (pair[1].sample.time_s - pair[0].sample.time_s));
+        let step_s = pair[1].sample.time_s - pair[0].sample.time_s;
+        steps.push([length_m / step_s, step_s]);
     }
-    median(&mut speeds).unwrap_or(0.0)
+    weighted_median(steps).unwrap_or(0.0)
 }
 
 struct Flight<'a> {

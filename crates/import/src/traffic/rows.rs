@@ -19,6 +19,9 @@ const SPEEDS_KT: RangeInclusive<f64> = 0.0..=5_000.0;
 /// The longest time in s between the middle row and any other: no recording takes 30 years.
 const MAX_DURATION_S: f64 = 1e9;
 
+/// The least time in s since 1970 of a recording of traffic, in the year 1973: smaller numbers count from elsewhere.
+const MIN_PRESENT_S: f64 = 1e8;
+
 /// The rule by which columns are not used.
 pub(super) const UNUSED_COLUMNS_RULE: &str = "columns";
 
@@ -146,6 +149,11 @@ impl RowCollector {
             let rule = "the only altitude is the geometric one, and levels are compared by it";
             self.report.record(Treatment::Guessed, rule, "", "");
         }
+        for name in &layout.repeated {
+            let rule = "columns of a name that the header has several times: the first one is read";
+            let remedy = "give each column a name of its own";
+            self.report.record(Treatment::Guessed, rule, format!("`{name:.40}`"), remedy);
+        }
         for name in &layout.unused {
             self.report.record(
                 Treatment::NotUsed,
@@ -207,6 +215,7 @@ impl RowCollector {
     /// When there is none, or more than half of all are bad.
     pub(super) fn finish(mut self) -> Result<CheckedRows, InputError> {
         let unit = self.unix_unit();
+        let has_early_times = self.has_early_times();
         let mut zoneless = 0;
         let mut rows = Vec::with_capacity(self.rows.len());
         for timed in std::mem::take(&mut self.rows) {
@@ -221,6 +230,12 @@ impl RowCollector {
         if zoneless > 0 {
             let rule = "times without a zone are UTC";
             self.report.record(Treatment::Guessed, rule, "", "write `Z` or the offset behind them");
+        }
+        if has_early_times {
+            let rule = "times are seconds since 1970 and lie before 1973: they may count from another start";
+            let remedy =
+                "add the seconds from 1970 to that start, for dates and hours in what comes out";
+            self.report.record(Treatment::Guessed, rule, "", remedy);
         }
         if unit != UnixUnit::Seconds {
             let rule = format!("times are {} since 1970, by their size", unit.name());
@@ -240,15 +255,25 @@ impl RowCollector {
         })
     }
 
-    /// Returns the unit of numbers since 1970: that of the middle one.
-    fn unix_unit(&self) -> UnixUnit {
-        let mut sizes = Vec::new();
+    /// Returns the middle one of the numbers since 1970, where there are any.
+    fn middle_number(&self) -> Option<f64> {
+        let mut numbers = Vec::new();
         for timed in &self.rows {
             if let WrittenTime::Unix(value) = timed.time {
-                sizes.push(value);
+                numbers.push(value);
             }
         }
-        median(&mut sizes).map_or(UnixUnit::Seconds, UnixUnit::of_size)
+        median(&mut numbers)
+    }
+
+    /// Returns the unit of numbers since 1970: that of the middle one.
+    fn unix_unit(&self) -> UnixUnit {
+        self.middle_number().map_or(UnixUnit::Seconds, UnixUnit::of_size)
+    }
+
+    /// Returns whether times are numbers that nobody has recorded as seconds since 1970.
+    fn has_early_times(&self) -> bool {
+        self.middle_number().is_some_and(|middle| middle.abs() < MIN_PRESENT_S)
     }
 
     /// Leaves out rows whose time is decades from that of the middle row.
@@ -374,13 +399,21 @@ pub(super) struct CheckedRows {
 /// Returns what tells aircraft apart: the address, which has no case and no leading zeros, or else a name; and the
 /// flight, where the file names it.
 pub(super) fn aircraft_key(row: &Row) -> [String; 2] {
-    let address = row.address.to_ascii_lowercase();
+    let address = plain_address(&row.address);
     let address = address.strip_prefix("0x").unwrap_or(&address).trim_start_matches('0');
     let flight = row.flight_id.clone();
     if row.address.is_empty() && flight.is_empty() {
         return [format!("callsign {}", row.callsign), flight];
     }
     [address.to_string(), flight]
+}
+
+/// Returns an address in lower case, its pairs of digits without marks between them: `4B:12:34` is `4b1234`.
+fn plain_address(address: &str) -> String {
+    let address = address.to_ascii_lowercase();
+    let bare = address.replace([':', '-', ' '], "");
+    let is_of_pairs = bare.len() == 6 && bare.bytes().all(|byte| byte.is_ascii_hexdigit());
+    if is_of_pairs { bare } else { address }
 }
 
 /// Returns the middle one of some numbers, which it sorts.
@@ -399,7 +432,7 @@ fn seconds(time: WrittenTime, unit: UnixUnit) -> f64 {
 /// A row, and the rules by which cells of it were left out.
 struct ReadRow {
     timed: TimedRow,
-    bad_cells: [Option<&'static str>; 3],
+    bad_cells: [Option<&'static str>; 4],
 }
 
 /// Reads the cells of one row.
@@ -413,9 +446,12 @@ type Rule = &'static str;
 
 impl RowReader<'_> {
     fn row(&self, number: usize) -> Result<ReadRow, Rule> {
-        let time = match self.time(Field::Time) {
+        let has_time = [Field::Time, Field::UtcTime]
+            .into_iter()
+            .any(|field| self.value(field) != Value::Missing);
+        let time = match self.row_time() {
             Some(time) => time,
-            None if self.value(Field::Time) == Value::Missing => return Err("rows without a time"),
+            None if !has_time => return Err("rows without a time"),
             None => {
                 return Err(NO_TIME);
             }
@@ -426,6 +462,8 @@ impl RowReader<'_> {
         let (track_deg, bad_track) = self.optional(Field::Track, -360.0..=360.0);
         let (vertical_speed_fpm, bad_climb) =
             self.optional(Field::VerticalSpeed, f64::MIN..=f64::MAX);
+        let flag = self.value(Field::OnGround);
+        let bad_flag = flag != Value::Missing && flag.flag().is_none();
         let row = Row {
             number,
             address: self.name(Field::Address),
@@ -454,6 +492,7 @@ impl RowReader<'_> {
                 bad_speed.then_some("cells with a speed that is none"),
                 bad_track.then_some("cells with a direction that is none"),
                 bad_climb.then_some("cells with a vertical speed that is none"),
+                bad_flag.then_some("cells with a flag for the ground that is none"),
             ],
         })
     }
@@ -467,14 +506,30 @@ impl RowReader<'_> {
     }
 
     fn time(&self, field: Field) -> Option<WrittenTime> {
-        match self.value(field) {
+        let units_per_s = self.layout.column(field).map_or(1.0, |column| column.factor);
+        let time = match self.value(field) {
             Value::Number(value) if value.is_finite() => Some(WrittenTime::Unix(value)),
             Value::Text(text) if self.layout.source == Source::FlightPoints => {
                 parse_day_first(text)
             }
             Value::Text(text) => parse_time(text),
             _ => None,
+        };
+        match time {
+            Some(WrittenTime::Unix(value)) => Some(WrittenTime::Unix(value / units_per_s)),
+            other => other,
         }
+    }
+
+    /// Returns the time of the row: of two columns the one that is UTC by its name, where the other has no zone.
+    fn row_time(&self) -> Option<WrittenTime> {
+        let utc = self.time(Field::UtcTime).map(|time| match time {
+            WrittenTime::Calendar { utc_s, .. } => WrittenTime::Calendar { utc_s, has_zone: true },
+            WrittenTime::Unix(_) => time,
+        });
+        let time = self.time(Field::Time);
+        let is_local = matches!(time, None | Some(WrittenTime::Calendar { has_zone: false, .. }));
+        if is_local { utc.or(time) } else { time }
     }
 
     fn position(&self) -> Result<LatLon, Rule> {
@@ -484,7 +539,7 @@ impl RowReader<'_> {
                 let (lat, lon) = text.split_once(',').ok_or(NONE)?;
                 (Value::from_text(lat).number(), Value::from_text(lon).number())
             }
-            _ => (self.scaled(Field::Latitude), self.scaled(Field::Longitude)),
+            _ => (self.degrees(Field::Latitude, "NS"), self.degrees(Field::Longitude, "EW")),
         };
         let lat_deg = lat.map_err(|NotANumber| NO_NUMBER_POSITION)?.ok_or(NONE)?;
         let lon_deg = lon.map_err(|NotANumber| NO_NUMBER_POSITION)?.ok_or(NONE)?;
@@ -494,6 +549,18 @@ impl RowReader<'_> {
         }
         let lon_deg = if lon_deg > 180.0 { lon_deg - 360.0 } else { lon_deg };
         Ok(LatLon { lat_deg, lon_deg })
+    }
+
+    /// Returns an angle in degrees, which may have the letter of its half of the earth: `7.5W` is -7.5.
+    fn degrees(&self, field: Field, letters: &str) -> Result<Option<f64>, NotANumber> {
+        let Value::Text(text) = self.value(field) else { return self.scaled(field) };
+        let is_letter = |c: char| letters.contains(c.to_ascii_uppercase());
+        let bare = text.strip_suffix(is_letter).or_else(|| text.strip_prefix(is_letter));
+        let Some(bare) = bare else { return self.scaled(field) };
+        let size =
+            Value::from_text(bare).number()?.filter(|size| *size >= 0.0).ok_or(NotANumber)?;
+        let is_negative = text.contains(['S', 's', 'W', 'w']);
+        Ok(Some(if is_negative { -size } else { size }))
     }
 
     /// Returns a number in the unit of its field.
@@ -523,9 +590,14 @@ impl RowReader<'_> {
         if is_missing && let Some(other) = other {
             column = other;
         }
-        let value = self.values.value(column.index).number();
-        let value = value.map_err(|NotANumber| NO_NUMBER_ALTITUDE)?;
-        let altitude_ft = value.ok_or(NO_ALTITUDE)? * column.factor;
+        let cell = self.values.value(column.index);
+        let altitude_ft = match flight_level_ft(cell) {
+            Some(level_ft) => level_ft,
+            None => {
+                let value = cell.number().map_err(|NotANumber| NO_NUMBER_ALTITUDE)?;
+                value.ok_or(NO_ALTITUDE)? * column.factor
+            }
+        };
         if !ALTITUDES_FT.contains(&altitude_ft) {
             return Err("rows with an altitude that no aircraft has");
         }
@@ -551,6 +623,14 @@ impl RowReader<'_> {
         }
         self.value(Field::OnGround).flag()
     }
+}
+
+/// Returns the altitude in ft of a level that is written as one, whatever the column: `FL350`.
+fn flight_level_ft(cell: Value<'_>) -> Option<f64> {
+    let Value::Text(text) = cell else { return None };
+    let level = text.strip_prefix("FL").or_else(|| text.strip_prefix("fl"))?;
+    let level: f64 = level.trim_start().parse().ok()?;
+    level.is_finite().then_some(100.0 * level)
 }
 
 fn is_ground_word(cell: Value<'_>) -> bool {

@@ -83,7 +83,7 @@ fn bad_rows_are_left_out_and_counted_with_their_lines() {
         ("1533114905,a,,,6,1,200,3,", "rows without a position"),
         ("1533114905,a,,46,NaN,1,200,3,", "rows without a position"),
         ("1533114905,a,,46,null,1,200,3,", "rows without a position"),
-        ("1533114905,a,,46,6 E,1,200,3,", "rows with a position that is no number"),
+        ("1533114905,a,,46,6 X,1,200,3,", "rows with a position that is no number"),
         ("1533114905,a,,91,6,1,200,3,", "rows with a position that is not on the earth"),
         ("1533114905,a,,46,-181,1,200,3,", "rows with a position that is not on the earth"),
         ("1533114905,a,,46,6,,200,3,", "rows without an altitude"),

@@ -51,7 +51,7 @@ fn no_text(collector: &RowCollector, cause: &str) -> InputError {
 
 /// Returns a text in UTF-16, which a byte order mark or zeros beside its first letters tell: `None` for anything else,
 /// `Some(None)` for one that is damaged.
-fn decode_utf16(bytes: &[u8]) -> Option<Option<String>> {
+pub(crate) fn decode_utf16(bytes: &[u8]) -> Option<Option<String>> {
     let (unit, begin): (fn([u8; 2]) -> u16, usize) = match bytes.get(..4)? {
         [0xff, 0xfe, ..] => (u16::from_le_bytes, 2),
         [0xfe, 0xff, ..] => (u16::from_be_bytes, 2),

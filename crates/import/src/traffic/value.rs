@@ -47,7 +47,9 @@ impl<'a> Value<'a> {
             Self::Number(1.0 | -1.0) => Some(true),
             Self::Text(text) => match text.to_ascii_lowercase().as_str() {
                 "true" | "t" | "yes" | "y" | "1" | "1.0" | "-1" => Some(true),
+                "ground" | "on ground" | "gnd" => Some(true),
                 "false" | "f" | "no" | "n" | "0" | "0.0" => Some(false),
+                "air" | "in air" | "airborne" => Some(false),
                 _ => None,
             },
             Self::Missing | Self::Number(_) => None,

@@ -398,8 +398,8 @@ fn a_row_that_is_fast_and_low_says_nothing_of_its_column() {
 #[test]
 fn a_cell_with_its_unit_says_what_to_write() {
     for (change, wanted) in [
-        (("35000", "FL350"), "plain numbers in the unit"),
-        ((",47,", ",N47,"), "negative in the south"),
+        (("35000", "35000ft"), "plain numbers in the unit"),
+        ((",47,", ",47d,"), "negative in the south"),
         (("15331", "x15331"), "2018-08-01T09:00:00Z"),
     ] {
         let error = parse(&"f", &table(4, |_, row| row.replace(change.0, change.1)));

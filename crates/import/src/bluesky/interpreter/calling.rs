@@ -4,6 +4,7 @@ use super::{CommandOutcome, CommandResult, Interpreter, refusal, upper};
 use crate::bluesky::calls::{MAX_CALL_DEPTH, MAX_CALLS};
 use crate::bluesky::lines::{CommandFile, CommandText, MAX_LINE_BYTES, join_lines};
 use crate::bluesky::schedule::MAX_COMMANDS;
+use crate::bluesky::text::ScnText;
 use crate::bluesky::traffic::Setting;
 use crate::bluesky::values::{Arguments, duration_s};
 use crate::report::Treatment;
@@ -64,6 +65,10 @@ impl Interpreter {
             .folder
             .read(name.text)
             .map_err(|(cause, remedy)| refusal(arguments, name, cause, remedy))?;
+        if (0..values.len()).any(|k| !text.text.contains(&format!("%{k}"))) {
+            let rule = "further arguments of PCALL, for which the file has no %0, %1, ...";
+            self.note(Treatment::NotUsed, rule, "leave them out");
+        }
         let prefix = format!("{} ", path.file_name().unwrap_or_default().to_string_lossy());
         let file = CommandFile { name: path.display().to_string(), prefix, depth };
         self.add_file(Rc::new(file), &text, values, start_s);
@@ -74,11 +79,16 @@ impl Interpreter {
     pub(super) fn add_file(
         &mut self,
         file: Rc<CommandFile>,
-        text: &str,
+        text: &ScnText,
         values: &[String],
         start_s: f64,
     ) {
-        let (lines, short_lines) = join_lines(text);
+        for line in &text.replaced_lines {
+            self.place = format!("{}line {line}", file.prefix);
+            let rule = "lines with characters that are not UTF-8, which are replaced";
+            self.note(Treatment::Repaired, rule, "save the file as UTF-8");
+        }
+        let (lines, short_lines) = join_lines(&text.text);
         self.result.short_lines += short_lines;
         let mut commands: Vec<CommandText> = Vec::new();
         for line in &lines {

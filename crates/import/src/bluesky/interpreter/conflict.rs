@@ -55,6 +55,11 @@ impl Interpreter {
             let cause = format!("{} would not move against {target_word}", id.text);
             return Err(refusal(arguments, id, cause, "give another angle or another speed"));
         };
+        if start.position.lat_deg.abs() > 90.0 {
+            let cause = format!("{} would start beyond a pole", id.text);
+            let remedy = "create it with CRE, or give a shorter time";
+            return Err(refusal(arguments, id, cause, remedy));
+        }
         let speed = cas_of(start.true_airspeed_mps, start.altitude_ft);
         let mut changes = Vec::new();
         if start.altitude_ft != state.altitude_ft {
