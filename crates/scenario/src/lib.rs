@@ -44,8 +44,8 @@ pub use metric_info::{MetricInfo, MetricLabel, metric_label};
 #[doc(hidden)]
 pub use metric_info::{phrase, phrase_len};
 pub use number::{
-    AboveZero, AnyFinite, AtLeastZero, Closed, Fraction, Integer, Interval, LeftOpen, NonNegative,
-    Number, NumberRange, Open, Point, Positive, RightOpen, Rule, invalid_value,
+    AboveZero, AnyFinite, AtLeastZero, Closed, FixedList, Fraction, Integer, Interval, LeftOpen,
+    NonNegative, Number, NumberRange, Open, Point, Positive, RightOpen, Rule, invalid_value,
 };
 pub use remark::{Remark, Severity};
 pub use sections::Sections;

@@ -289,6 +289,28 @@ impl<'de, const D: usize, R: Rule> Deserialize<'de> for Point<D, R> {
     }
 }
 
+/// A list of exactly `N` values. A plain array would be read from a longer list as well, without its last values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FixedList<T, const N: usize>([T; N]);
+
+impl<T, const N: usize> FixedList<T, N> {
+    /// Returns its values.
+    pub fn get(self) -> [T; N] {
+        self.0
+    }
+}
+
+impl<'de, T: Deserialize<'de>, const N: usize> Deserialize<'de> for FixedList<T, N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let values = Vec::<T>::deserialize(deserializer)?;
+        let count = values.len();
+        let values = <[T; N]>::try_from(values);
+        values
+            .map(Self)
+            .map_err(|_| invalid_value(format_args!("{count} values"), &format!("give {N} values")))
+    }
+}
+
 /// One number, or a minimum and a maximum: `0.5` or `[0.4, 0.6]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NumberRange {
@@ -380,6 +402,7 @@ mod tests {
         d: Option<NumberRange>,
         e: Option<Vec<Fraction>>,
         f: Option<toml::Spanned<NonNegative>>,
+        g: Option<FixedList<u32, 2>>,
     }
 
     fn read(text: &str) -> Result<Section, InputError> {
@@ -404,6 +427,8 @@ mod tests {
     #[test]
     fn wrong_values_are_told_with_key_and_place() {
         for (text, column, cause, remedy) in [
+            ("g = [1, 2, 3]", 5, "g = 3 values", "give 2 values"),
+            ("g = [1]", 5, "g = 1 values", "give 2 values"),
             ("a = 0.0", 5, "a = 0", "above 0"),
             ("a = nan", 5, "a = NaN", "above 0"),
             ("a = inf", 5, "a = inf", "above 0"),

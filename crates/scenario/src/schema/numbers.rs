@@ -1,6 +1,6 @@
 //! Numbers that check themselves, in terms of JSON Schema.
 
-use crate::{Integer, Number, NumberRange, Point, Rule};
+use crate::{FixedList, Integer, Number, NumberRange, Point, Rule};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -66,6 +66,19 @@ impl<const D: usize, R: Rule> JsonSchema for Point<D, R> {
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         let items = numbers(R::limits());
         json_schema!({ "type": "array", "items": items, "minItems": D, "maxItems": D })
+    }
+}
+
+impl<T: JsonSchema, const N: usize> JsonSchema for FixedList<T, N> {
+    inline!("FixedList");
+
+    fn schema_id() -> Cow<'static, str> {
+        std::any::type_name::<Self>().into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let items = generator.subschema_for::<T>();
+        json_schema!({ "type": "array", "items": items, "minItems": N, "maxItems": N })
     }
 }
 

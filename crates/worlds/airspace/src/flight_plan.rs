@@ -10,7 +10,7 @@ use super::settings::{SeparationM, Speed, TurnCount, TurnRate};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
-use sidestep_scenario::{Closed, LeftOpen, Number, Point, Source, Spanned};
+use sidestep_scenario::{Closed, FixedList, LeftOpen, Number, Point, Source, Spanned};
 use std::ops::Range;
 
 /// Rate at which levels are changed when an order does not give one: 1500 ft/min.
@@ -40,9 +40,9 @@ pub(super) struct AirplaneSection {
     pub(super) altitude_m: Option<BoundedNumber>,
     pub(super) appears_s: Option<BoundedTime>,
     /// Recorded track: [t_s, x_m, y_m, altitude_m], ...
-    track: Option<Spanned<Vec<[f64; 4]>>>,
+    track: Option<Spanned<Vec<FixedList<f64, 4>>>>,
     /// Recorded track on the earth: [t_s, latitude_deg, longitude_deg, altitude_m], ...
-    track_deg: Option<Spanned<Vec<[f64; 4]>>>,
+    track_deg: Option<Spanned<Vec<FixedList<f64, 4>>>>,
     /// Orders on its way, one thing each.
     #[serde(default)]
     orders: Vec<Spanned<OrderSection>>,
@@ -226,7 +226,8 @@ impl AirplaneSection {
         let points: Vec<TrackPoint> = rows
             .get_ref()
             .iter()
-            .map(|&[t_s, x, y, altitude_m]| {
+            .map(|row| {
+                let [t_s, x, y, altitude_m] = row.get();
                 let at = match surface {
                     Surface::Plane => [x, y],
                     Surface::Earth => {

@@ -22,7 +22,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use sidestep_map::UnknownPolicy;
 use sidestep_map::office::OfficeSpec;
-use sidestep_scenario::{Fraction, LeftOpen, Number, Open, Positive, Sections, Spanned};
+use sidestep_scenario::{FixedList, Fraction, LeftOpen, Number, Open, Positive, Sections, Spanned};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -236,7 +236,7 @@ pub(super) struct RobotSection {
     #[serde(default)]
     pub(super) at: Vec<Spanned<StartPose>>,
     /// Rectangle in which places are drawn.
-    pub(super) region: Option<Spanned<[u32; 4]>>,
+    pub(super) region: Option<Spanned<FixedList<u32, 4>>>,
     pub(super) scen: Option<Spanned<PathBuf>>,
     pub(super) size: Option<SideBoxes>,
     pub(super) period: Option<Period>,
@@ -331,7 +331,7 @@ pub(super) struct MoverSection {
     #[serde(default)]
     pub(super) at: Vec<Spanned<StartPose>>,
     /// Rectangle in which places are drawn.
-    pub(super) region: Option<Spanned<[u32; 4]>>,
+    pub(super) region: Option<Spanned<FixedList<u32, 4>>>,
     pub(super) size: Option<[SideBoxes; 2]>,
     pub(super) period: Option<Period>,
     /// Cycle of the period in which they act.

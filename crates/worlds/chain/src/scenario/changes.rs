@@ -9,7 +9,7 @@ use serde::Deserialize;
 use sidestep_kernel::InputError;
 use sidestep_rods::Chain;
 use sidestep_rods::rebuild::MovableEnd;
-use sidestep_scenario::{NonNegative, Number, Open, Spanned};
+use sidestep_scenario::{FixedList, NonNegative, Number, Open, Spanned};
 use std::ops::Range;
 
 /// Standard deviation of each coordinate of a scattered connector, unless it is given, meters.
@@ -39,7 +39,7 @@ pub(super) struct ChangeSection<const D: usize> {
     max_bend_deg: Option<f64>,
     /// Places where it may be from then on.
     mobility: Option<MobilitySection<D>>,
-    scatter: Option<[usize; 2]>,
+    scatter: Option<FixedList<usize, 2>>,
     by_m: Option<Number<Open<0, 10_000>>>,
     apart_m: Option<PointValue<D>>,
     reform: Option<bool>,
@@ -95,7 +95,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     ) -> Result<ChainChangeKind<D>, InputError> {
         self.check_single_change_key(s, at.clone())?;
         let n = chain.points().len();
-        if let Some([first, last]) = s.scatter {
+        if let Some([first, last]) = s.scatter.map(FixedList::get) {
             return self.scatter(s, [first, last], n, at);
         }
         if s.reform == Some(true) {

@@ -42,7 +42,7 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{EntityId, InputError, Seed};
 use sidestep_map::planning::{FlowField, FreeSpace};
 use sidestep_map::{Cell, GridMap, Rect};
-use sidestep_scenario::{Head, Remark, Source, Spanned, suggestion};
+use sidestep_scenario::{FixedList, Head, Remark, Source, Spanned, suggestion};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;

@@ -103,10 +103,10 @@ impl Compiler<'_> {
 
     pub(super) fn region(
         &self,
-        region: Option<&Spanned<[u32; 4]>>,
+        region: Option<&Spanned<FixedList<u32, 4>>>,
     ) -> Result<Option<[u32; 4]>, InputError> {
         let Some(spanned) = region else { return Ok(None) };
-        let r = *spanned.get_ref();
+        let r = spanned.get_ref().get();
         self.check_rect(r, spanned.span())?;
         Ok(Some(r))
     }
