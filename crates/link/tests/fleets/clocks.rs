@@ -1,14 +1,15 @@
 //! Clocks: they are never compared, so one that is wrong, or jumps, changes nothing.
 
-use crate::processes::{LinkProcess, folder, job};
+use crate::processes::{LinkProcess, folder, job, signal};
 use crate::support::{run_in_one_process, superconflict, wide};
 use serde_json::Value;
 use sidestep_session::fleet::{
-    AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Topology,
+    AgentName, ClockMode, FleetJob, FleetStatus, Job, LinkMessage, NodeJob, Topology,
 };
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 const FAST: ClockMode = ClockMode::Realtime { speed: 20.0 };
 
@@ -91,6 +92,47 @@ fn a_wall_clock_that_jumps_makes_nobody_late_or_lost() {
         _ => None,
     });
     assert_eq!(losses, 0);
+}
+
+/// Stops all processes of a fleet for longer than its lease, as a machine that is suspended does, and lets them go on.
+fn suspend(server: &LinkProcess, fleet: &FleetStatus) {
+    let nodes = fleet.nodes.iter().map(|node| node.process.expect("it has joined"));
+    let processes: Vec<u32> = [server.child.id()].into_iter().chain(nodes).collect();
+    processes.iter().for_each(|&process| signal(process, "STOP"));
+    std::thread::sleep(Duration::from_secs(SHORT_LEASE_S + 2));
+    processes.iter().for_each(|&process| signal(process, "CONT"));
+}
+
+/// Longer than links need to be opened again.
+const SHORT_LEASE_S: u64 = 5;
+
+#[test]
+fn a_fleet_that_is_suspended_for_longer_than_its_lease_comes_out_as_in_one_process() {
+    let text = superconflict(3, "compact-team", 60, "");
+    let folder = folder(&text);
+    let mut job = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
+    job.common.lease_s = SHORT_LEASE_S as f64;
+    let server = LinkProcess::start(&Job::Fleet(job));
+    let now = server.fleet("some cycles", |now| now.cycle > 3);
+    suspend(&server, &now);
+    let (summary, _) = server.complete();
+    assert_eq!(summary["digest"], run_in_one_process(&text).digest);
+    assert_eq!(server.end(), (Some(0), None));
+}
+
+#[test]
+fn in_real_time_a_fleet_that_is_suspended_for_longer_than_its_lease_loses_nobody() {
+    let folder = folder(&wide(&superconflict(3, "compact-team", 1_000_000, ""), 8_000));
+    let mut job = job(folder.path(), Topology::Star, FAST);
+    job.common.lease_s = SHORT_LEASE_S as f64;
+    let server = LinkProcess::start(&Job::Fleet(job));
+    let now = server.fleet("some cycles", |now| now.nodes.iter().all(|node| node.flown > 3));
+    suspend(&server, &now);
+    let flown: Vec<u64> = now.nodes.iter().map(|node| node.flown).collect();
+    let now = server.fleet("they fly on", |now| {
+        now.nodes.iter().zip(&flown).all(|(node, flown)| node.flown > flown + 12)
+    });
+    assert!(now.nodes.iter().all(|node| node.lives == 1), "{now:?}");
 }
 
 /// Two machines with monotonic clocks that are unrelated, too: one has run for a day longer.

@@ -2,6 +2,7 @@
 
 mod chains;
 mod clocks;
+mod cuts;
 mod faults;
 mod input;
 mod namespaces;
