@@ -42,12 +42,14 @@ pub(super) fn import_file(
     options: &ImportOptions,
 ) -> Result<Option<ImportedScenario>, InputError> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut reasons = EmptyFileReasons::default();
     let (scenario, report, (mut json, lines)) = match traffic_file_format(file) {
         TrafficFileFormat::Other => return Ok(None),
         TrafficFileFormat::Bluesky => {
             let scn = bluesky::read_with(file, &bluesky_options(file, options)?)?;
             let settings = settings_from_bluesky(&file.display().to_string(), &scn);
             let report = full_report(&scn, &settings);
+            reasons = EmptyFileReasons::new(&scn, &settings);
             (from_bluesky(&name, &scn), report.clone(), bluesky_report(&scn, &settings, &report))
         }
         TrafficFileFormat::Tracks => {
@@ -59,11 +61,44 @@ pub(super) fn import_file(
         // As for a scenario, because a reader of the number does not ask for the reason.
         json["airplanes"] = 0.into();
     }
-    let scenario = scenario.ok_or_else(|| {
-        let remedy = "give a file that creates aircraft at known places, with speeds";
-        InputError::new(file.display(), "no aircraft in it has a place and a speed", remedy)
-    });
+    let scenario = scenario.ok_or_else(|| reasons.error(file));
     Ok(Some(ImportedScenario { scenario, report, json, lines }))
+}
+
+/// Why none of the aircraft of a file flies.
+#[derive(Debug, Default)]
+struct EmptyFileReasons {
+    /// The first line that cannot be read or carried out.
+    first: Option<InputError>,
+    /// A place at which an aircraft starts, and that nothing defines.
+    unknown_place: Option<String>,
+}
+
+impl EmptyFileReasons {
+    fn new(scn: &ScnFile, settings: &ImportedScenarioSettings) -> Self {
+        let mut errors = scn.unparsed.iter().chain(&scn.refused).chain(&settings.refused);
+        Self {
+            first: errors.next().cloned(),
+            unknown_place: scn.traffic.unplaced.first().map(|one| one.place.clone()),
+        }
+    }
+
+    fn error(self, file: &Path) -> InputError {
+        const CAUSE: &str = "no aircraft in it has a place and a speed";
+        if let Some(place) = self.unknown_place {
+            let cause = format!("{CAUSE}; one starts at {place}, which the file does not define");
+            let remedy = "add --navdata with the folder of a navigation database";
+            return InputError::new(file.display(), cause, remedy);
+        }
+        if let Some(first) = self.first {
+            let line =
+                first.line_and_column().map_or(String::new(), |(line, _)| format!(" {line}"));
+            let cause = format!("{CAUSE}; line{line}: {}", first.cause());
+            return InputError::new(file.display(), cause, first.remedy());
+        }
+        let remedy = "give a file that creates aircraft at known places, with speeds";
+        InputError::new(file.display(), CAUSE, remedy)
+    }
 }
 
 /// Largest number of commands without effect that a report lists one by one.

@@ -44,10 +44,11 @@ fn section_head(track: &Track) -> String {
 }
 
 fn write_track(text: &mut String, track: &Track, start_s: f64) {
-    let omega_deg_s = banked_turn_deg_s(mean_speed_m_s(track).max(1.0));
+    let v_m_s = typical_speed_m_s(track).max(MIN_SPEED_M_S);
+    let omega_deg_s = banked_turn_deg_s(v_m_s);
     text.push_str(&section_head(track));
     // Writing to a string cannot fail.
-    if let Some(v_m_s) = speed_beside_jumps_m_s(track) {
+    if has_jump(track, v_m_s) {
         let _ = writeln!(text, "v_m_s = {v_m_s:?}");
     }
     let _ = writeln!(text, "omega_max_deg_s = {omega_deg_s:?}\ntrack_deg = [");
@@ -81,32 +82,22 @@ fn write_straight_flight(text: &mut String, track: &Track, start_s: f64) {
     );
 }
 
-/// The greatest speed in m/s, some 5,000 kt, that the way of a flight has without jumps.
-const MAX_WAY_SPEED_M_S: f64 = 2_600.0;
+/// A step between rows that is longer than this factor of what its speed gives, and half a nautical mile more, is a jump.
+const JUMP_FACTOR: f64 = 2.0;
 
-/// Returns the median speed between the rows of a flight whose way is so long that positions of it must be wrong; `None`
-/// where its way gives its speed.
-fn speed_beside_jumps_m_s(track: &Track) -> Option<f64> {
-    let mut speeds = Vec::with_capacity(track.samples.len());
-    let mut length_m = 0.0;
-    let mut duration_s = 0.0;
-    for pair in track.samples.windows(2) {
+/// Returns whether a flight of this speed jumps: then the length of its way does not give its speed.
+fn has_jump(track: &Track, v_m_s: f64) -> bool {
+    track.samples.windows(2).any(|pair| {
         let step_m = LocalPlane::centered_at(pair[0].position).to_plane_m(pair[1].position);
-        let step_length_m = math::hypot(step_m[0], step_m[1]);
         let step_s = pair[1].time_s - pair[0].time_s;
-        length_m += step_length_m;
-        duration_s += step_s;
-        speeds.push(step_length_m / step_s);
-    }
-    if length_m <= MAX_WAY_SPEED_M_S * duration_s {
-        return None;
-    }
-    speeds.sort_by(f64::total_cmp);
-    Some(speeds.get(speeds.len() / 2)?.clamp(1.0, MAX_WAY_SPEED_M_S))
+        let reach_m = JUMP_FACTOR * v_m_s * step_s + 0.5 * NAUTICAL_MILE_M;
+        math::hypot(step_m[0], step_m[1]) > reach_m
+    })
 }
 
-/// Returns the mean of the speeds that a flight reports, or else that of its rows.
-fn mean_speed_m_s(track: &Track) -> f64 {
+/// Returns the speed of a flight: the mean of those that it reports, or else the median of its rows. The mean of its way
+/// would be too fast where a position is wrong.
+fn typical_speed_m_s(track: &Track) -> f64 {
     let mut sum_kt = 0.0;
     let mut count = 0.0;
     for speed_kt in track.samples.iter().filter_map(|sample| sample.ground_speed_kt) {
@@ -116,15 +107,7 @@ fn mean_speed_m_s(track: &Track) -> f64 {
     if count > 0.0 {
         return sum_kt / count * KNOT_M_S;
     }
-    let (Some(first), Some(last)) = (track.samples.first(), track.samples.last()) else {
-        return 0.0;
-    };
-    let mut length_m = 0.0;
-    for pair in track.samples.windows(2) {
-        let step_m = LocalPlane::centered_at(pair[0].position).to_plane_m(pair[1].position);
-        length_m += math::hypot(step_m[0], step_m[1]);
-    }
-    length_m / (last.time_s - first.time_s)
+    track.median_speed_m_s().unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -188,7 +171,23 @@ mod tests {
         let text =
             "time_s,icao24,lat_deg,lon_deg,alt_ft\n0,a,47.0,7.0,35000\n10,a,47.0,7.03,35000\n";
         let traffic = parse(&"t.csv", text).expect("traffic");
-        let v_m_s = mean_speed_m_s(&traffic.tracks[0]);
+        let v_m_s = typical_speed_m_s(&traffic.tracks[0]);
         assert!((v_m_s - 227.5).abs() < 0.5, "{v_m_s}");
+    }
+
+    #[test]
+    fn a_jump_makes_no_flight_faster_whether_it_reports_speeds_or_not() {
+        for speed in ["440", ""] {
+            let mut text = String::from("time_s,icao24,callsign,lat_deg,lon_deg,alt_ft,gs_kt\n");
+            for k in 0..40 {
+                let lon_deg = 7.0 + 0.03 * f64::from(k);
+                // A hundred kilometers: the mean of the way would be some 480 m/s.
+                let lat_deg = if k < 20 { 47.0 } else { 47.9 };
+                let _ = writeln!(text, "{},aaaaa1,A1,{lat_deg},{lon_deg:.2},35000,{speed}", 10 * k);
+            }
+            let compiled = CompiledAirspace::new(&Source::new("t", scenario(&text), ""));
+            let v_m_s = compiled.expect("a scenario").world.airplanes[0].model.v_m_s;
+            assert!((v_m_s - 227.0).abs() < 5.0, "{v_m_s} {speed}");
+        }
     }
 }
