@@ -220,7 +220,8 @@ pub fn cut_track(poses: Vec<StampedPose2>, rule: &SpeedRule) -> CutTrack {
     CutTrack { track, jumps: described, dropped }
 }
 
-fn describe_jump(from: &StampedPose2, to: &StampedPose2) -> String {
+/// Describes a step, as `at 5.000 s: 3.21 m and 0.10 rad in 0.050 s`.
+pub(crate) fn describe_jump(from: &StampedPose2, to: &StampedPose2) -> String {
     let turn_rad = wrap_angle(to.heading_rad - from.heading_rad).abs();
     format!(
         "at {:.3} s: {:.2} m and {:.2} rad in {:.3} s",

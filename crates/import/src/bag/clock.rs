@@ -7,16 +7,13 @@
 use sidestep_kernel::InputError;
 
 use super::offsets;
-use super::streams::Stream;
+use super::streams::{Stream, Timing};
 use crate::report::{ImportReport, Treatment};
 use crate::track::StampedPose2;
 
 /// Messages on a network may overtake each other by up to this; several stamps further back are from a clock that was set
 /// back.
 const MAX_BACKWARD_STEP_SECS: f64 = 0.5;
-/// A stamp further ahead of the previous one, without as much time in between, is from a clock that was set forward,
-/// such as from 1970 to the present.
-const MAX_FORWARD_STEP_SECS: f64 = 3600.0;
 /// The time between epochs: nothing is interpolated across it.
 const EPOCH_GAP_SECS: f64 = 10.0;
 /// Maximum number of epochs: more are a recording without any clock.
@@ -42,7 +39,7 @@ pub(super) fn align(
     for stream in streams.iter_mut() {
         replace_unset_stamps(stream, report);
     }
-    offsets::add_rates(streams, report);
+    record_rates(streams, report);
     let mut all_jumps = Vec::new();
     for stream in streams.iter() {
         let back = backward_jumps(stream);
@@ -136,20 +133,16 @@ fn record_jumps(stream: &Stream<'_>, jumps: &[Jump], report: &mut ImportReport) 
     }
 }
 
-/// Records stamps that are far ahead of those before, by the times of the recording, or, where it has none, by themselves.
+fn record_rates(streams: &[Stream<'_>], report: &mut ImportReport) {
+    let timings: Vec<Vec<Timing>> = streams.iter().map(Stream::timings).collect();
+    let names = streams.iter().map(|stream| &*stream.name);
+    let sources: Vec<(&str, &[Timing])> = names.zip(timings.iter().map(Vec::as_slice)).collect();
+    offsets::record_rates(&sources, report);
+}
+
+/// Records stamps that are far ahead of those before.
 fn record_forward_jumps(stream: &Stream<'_>, report: &mut ImportReport) {
-    let mut jumps: Vec<usize> = forward_jumps(stream).iter().map(|jump| jump.item).collect();
-    for (k, pair) in stream.items.windows(2).enumerate() {
-        let step_secs = pair[1].t_secs() - pair[0].t_secs();
-        let recorded_secs = pair[1].log_secs() - pair[0].log_secs();
-        if step_secs > MAX_FORWARD_STEP_SECS && recorded_secs < 0.5 * step_secs {
-            jumps.push(k + 1);
-        }
-    }
-    jumps.sort_unstable();
-    jumps.dedup();
-    for item in jumps {
-        let step_secs = stream.items[item].t_secs() - stream.items[item - 1].t_secs();
+    for (item, step_secs) in offsets::forward_steps(&stream.timings()) {
         let message = stream.items[item].message();
         let place = format!("message {message} is stamped {step_secs:.3} s after the one before");
         let rule = format!(

@@ -32,9 +32,24 @@ pub(super) struct Tally {
     bad: u64,
     /// The first bad messages, with their causes.
     places: Vec<String>,
+    /// The messages with an orientation of another length than 1: their number, and the first ones.
+    scaled: u64,
+    scaled_places: Vec<String>,
 }
 
 impl Tally {
+    /// Adds what can be read of a message.
+    pub(super) fn add_pose(&mut self, number: u64, pose: &StampedPose) {
+        self.good += 1;
+        if !pose.was_scaled {
+            return;
+        }
+        self.scaled += 1;
+        if self.scaled_places.len() < crate::report::MAX_PLACES {
+            self.scaled_places.push(format!("message {number}"));
+        }
+    }
+
     pub(super) fn add_bad(&mut self, number: u64, cause: &str) {
         self.bad += 1;
         if self.places.len() < crate::report::MAX_PLACES {
@@ -49,7 +64,7 @@ impl Tally {
     /// Returns the sum of two tallies, with the places of the first that has any.
     pub(super) fn sum(self, other: &Self) -> Self {
         let places = if self.places.is_empty() { other.places.clone() } else { self.places };
-        Self { good: self.good + other.good, bad: self.bad + other.bad, places }
+        Self { good: self.good + other.good, bad: self.bad + other.bad, places, ..self }
     }
 
     /// Checks that at most half of the messages on a topic are bad or lost.
@@ -70,6 +85,12 @@ impl Tally {
         for k in 0..self.bad {
             let place = self.places.get(k as usize).cloned().unwrap_or_default();
             report.record(Treatment::Dropped, rule.clone(), place, "");
+        }
+        let rule =
+            format!("orientations on {topic} whose length is not 1, of which the direction counts");
+        for k in 0..self.scaled {
+            let place = self.scaled_places.get(k as usize).cloned().unwrap_or_default();
+            report.record(Treatment::Repaired, rule.clone(), place, "");
         }
     }
 }
@@ -205,7 +226,7 @@ impl<'a> BagContent<'a> {
                     continue;
                 }
             };
-            self.tally(raw.topic).good += 1;
+            self.tally(raw.topic).add_pose(raw.number, &pose);
             self.keep_pose(raw, pose, is_selected);
         }
     }

@@ -12,11 +12,10 @@ use super::poses::{self, StampedPose};
 use super::scans::RangeCounts;
 use super::storage::{self, RawMessage};
 use super::streams::Timing;
-use super::topics;
-use crate::report::{ImportReport, Treatment};
-
-/// Stamps further back than this are from a clock that was set back.
-const MAX_BACKWARD_STEP_SECS: f64 = 0.5;
+use super::topic_clock::TopicClock;
+use super::topic_motion::TopicMotion;
+use super::topics::{self, is_static};
+use crate::report::ImportReport;
 
 /// Reads a bag message by message and reports what is in it. Nothing of it is kept, whatever its size.
 ///
@@ -55,20 +54,16 @@ pub(super) fn check(raw: &RawMessage<'_>) -> Result<Checked, String> {
     let poses = poses::decode_poses(&raw.info.schema, encoding, bytes)?;
     let poses: Vec<StampedPose> = poses.into_iter().collect::<Result<_, _>>()?;
     if raw.info.schema == TfMessage::NAME {
-        let pairs =
-            poses.iter().map(|pose| [&pose.parent, &pose.child].map(|name| name.to_string()));
-        return Ok(Checked::Transforms(pairs.collect()));
+        return Ok(Checked::Transforms(poses));
     }
-    Ok(poses.first().map_or(Checked::Other, |pose| Checked::Poses(pose.t_secs)))
+    Ok(poses.into_iter().next().map_or(Checked::Other, |pose| Checked::Pose(Box::new(pose))))
 }
 
 /// A message that can be read.
 pub(super) enum Checked {
     Scan(Box<LaserScan>),
-    /// Poses, and the stamp of the first in s.
-    Poses(f64),
-    /// Transforms, by their frames.
-    Transforms(Vec<[String; 2]>),
+    Pose(Box<StampedPose>),
+    Transforms(Vec<StampedPose>),
     Other,
 }
 
@@ -77,31 +72,20 @@ pub(super) enum Checked {
 struct TopicFindings {
     tallies: BTreeMap<String, Tally>,
     ranges: BTreeMap<String, RangeCounts>,
-    clocks: BTreeMap<String, ClockFindings>,
+    clocks: BTreeMap<String, TopicClock>,
     recorded_secs: Option<[f64; 2]>,
     /// Numbers of transforms by topic, parent and child.
     frames: BTreeMap<(String, String, String), u64>,
+    /// By the name of the topic, with the frames of transforms.
+    motions: BTreeMap<String, TopicMotion>,
 }
 
 /// Maximum number of pairs of frames that are listed.
 const MAX_FRAMES: usize = 20;
 /// Maximum number of topics whose stamps are listed.
 const MAX_STAMPED: usize = 20;
-/// Maximum number of stamps of a topic that are compared with the recording: of more every second, every fourth, and so on.
-const MAX_TIMINGS: usize = 1 << 12;
-
-/// The stamps of a topic.
-struct ClockFindings {
-    stamps: u64,
-    first_secs: f64,
-    last_secs: f64,
-    latest_secs: f64,
-    /// Every so many stamps are kept with the times of the recording.
-    every: u64,
-    timings: Vec<Timing>,
-    backward_steps: Vec<String>,
-    backward: u64,
-}
+/// Maximum number of bodies whose motion is looked at.
+const MAX_MOTIONS: usize = 64;
 
 impl TopicFindings {
     fn add(&mut self, raw: &RawMessage<'_>) {
@@ -116,14 +100,19 @@ impl TopicFindings {
         match checked {
             Err(cause) => tally.add_bad(raw.number, &cause),
             Ok(Checked::Other) => tally.good += 1,
-            Ok(Checked::Poses(t_secs)) => {
-                tally.good += 1;
-                self.add_stamp(raw, t_secs);
+            Ok(Checked::Pose(pose)) => {
+                tally.add_pose(raw.number, &pose);
+                self.add_stamp(raw, pose.t_secs);
+                let name = match &*pose.child {
+                    "" => raw.topic.to_owned(),
+                    child => format!("{} ({} > {child})", raw.topic, pose.parent),
+                };
+                self.add_motion(&name, &pose);
             }
-            Ok(Checked::Transforms(pairs)) => {
+            Ok(Checked::Transforms(transforms)) => {
                 tally.good += 1;
                 // Transforms of several programs share a topic, and not their time.
-                self.add_frames(raw.topic, pairs);
+                self.add_frames(raw.topic, &transforms);
             }
             Ok(Checked::Scan(scan)) => {
                 tally.good += 1;
@@ -133,51 +122,43 @@ impl TopicFindings {
         }
     }
 
-    fn add_frames(&mut self, topic: &str, pairs: Vec<[String; 2]>) {
-        for [parent, child] in pairs {
+    fn add_frames(&mut self, topic: &str, transforms: &[StampedPose]) {
+        for transform in transforms {
+            let [parent, child] = [&transform.parent, &transform.child].map(ToString::to_string);
+            let name = format!("{topic} ({parent} > {child})");
             let key = (topic.to_owned(), parent, child);
             if self.frames.len() <= MAX_FRAMES || self.frames.contains_key(&key) {
                 *self.frames.entry(key).or_insert(0) += 1;
             }
+            if !is_static(topic) {
+                self.add_motion(&name, transform);
+            }
+        }
+    }
+
+    fn add_motion(&mut self, name: &str, pose: &StampedPose) {
+        if let Some(motion) = self.motions.get_mut(name) {
+            motion.add(pose.to_planar());
+        } else if self.motions.len() < MAX_MOTIONS {
+            let mut motion = TopicMotion::default();
+            motion.add(pose.to_planar());
+            self.motions.insert(name.to_owned(), motion);
         }
     }
 
     fn add_stamp(&mut self, raw: &RawMessage<'_>, t_secs: f64) {
-        let secs = log_secs(raw);
-        let Some(clock) = self.clocks.get_mut(raw.topic) else {
-            let clock = ClockFindings {
-                stamps: 1,
-                first_secs: t_secs,
-                last_secs: t_secs,
-                latest_secs: t_secs,
-                every: 1,
-                timings: vec![Timing { t_secs, log_secs: secs }],
-                backward_steps: Vec::new(),
-                backward: 0,
-            };
-            self.clocks.insert(raw.topic.into(), clock);
-            return;
-        };
-        clock.keep_timing(Timing { t_secs, log_secs: secs });
-        clock.stamps += 1;
-        let back_secs = clock.latest_secs - t_secs;
-        if back_secs > MAX_BACKWARD_STEP_SECS {
-            clock.backward += 1;
-            if clock.backward_steps.len() < crate::report::MAX_PLACES {
-                clock.backward_steps.push(format!("message {}: {back_secs:.3} s", raw.number));
-            }
-            clock.latest_secs = t_secs;
+        let timing = Timing { t_secs, log_secs: log_secs(raw) };
+        match self.clocks.get_mut(raw.topic) {
+            Some(clock) => clock.add(raw.number, timing),
+            None => drop(self.clocks.insert(raw.topic.into(), TopicClock::from_first(timing))),
         }
-        clock.latest_secs = clock.latest_secs.max(t_secs);
-        clock.first_secs = clock.first_secs.min(t_secs);
-        clock.last_secs = clock.last_secs.max(t_secs);
     }
 
     fn bad(&self) -> u64 {
         self.tallies.values().map(Tally::bad).sum()
     }
 
-    fn report(&self, bag: &str, report: &mut ImportReport) -> Result<(), InputError> {
+    fn report(&mut self, bag: &str, report: &mut ImportReport) -> Result<(), InputError> {
         if let Some([first, last]) = self.recorded_secs {
             report.add_fact(
                 "recorded",
@@ -189,69 +170,35 @@ impl TopicFindings {
         for (topic, tally) in &self.tallies {
             tally.report(topic, report);
         }
-        for (k, (topic, clock)) in self.clocks.iter().enumerate() {
-            if k < MAX_STAMPED {
-                let value =
-                    format!("{topic}: from {:.3} to {:.3} s", clock.first_secs, clock.last_secs);
-                report.add_fact("stamps", value);
-            }
-            clock.report(topic, report);
-        }
-        if self.clocks.len() > MAX_STAMPED {
-            report.add_fact("stamps", format!("{} more topics", self.clocks.len() - MAX_STAMPED));
-        }
+        self.report_clocks(report);
         for ((topic, parent, child), n) in self.frames.iter().take(MAX_FRAMES) {
             report.add_fact("frames", format!("{topic}: {parent} > {child}, {n} transforms"));
         }
         if self.frames.len() > MAX_FRAMES {
             report.add_fact("frames", "and others");
         }
+        for (name, motion) in &mut self.motions {
+            motion.report(name, report);
+        }
         for (topic, counts) in &self.ranges {
             counts.convention(topic, None, report);
         }
         Ok(())
     }
-}
 
-impl ClockFindings {
-    fn keep_timing(&mut self, timing: Timing) {
-        if !self.stamps.is_multiple_of(self.every) {
-            return;
+    fn report_clocks(&self, report: &mut ImportReport) {
+        for (topic, clock) in self.clocks.iter().take(MAX_STAMPED) {
+            report.add_fact("stamps", format!("{topic}: {}", clock.describe()));
         }
-        self.timings.push(timing);
-        if self.timings.len() > MAX_TIMINGS {
-            self.every *= 2;
-            let mut is_even = false;
-            self.timings.retain(|_| {
-                is_even = !is_even;
-                is_even
-            });
+        if self.clocks.len() > MAX_STAMPED {
+            report.add_fact("stamps", format!("{} more topics", self.clocks.len() - MAX_STAMPED));
         }
-    }
-
-    fn report(&self, topic: &str, report: &mut ImportReport) {
-        let Self { first_secs, last_secs, .. } = self;
-        let rule = format!("stamps of {topic} that go back");
-        for k in 0..self.backward {
-            let place = self.backward_steps.get(k as usize).cloned().unwrap_or_default();
-            report.record(Treatment::Suspicious, rule.clone(), place, "");
+        for (topic, clock) in &self.clocks {
+            clock.report(topic, report);
         }
-        let offset_secs = offsets::known_offset(&self.timings);
-        if let Some(ahead_secs) = offset_secs.filter(|secs| *secs > offsets::MAX_AHEAD_SECS) {
-            let rule = format!(
-                "stamps of {topic} that lie {ahead_secs:.3} s after the recording of their messages"
-            );
-            report.record(
-                Treatment::Suspicious,
-                rule,
-                "",
-                "synchronize the clocks of the machines",
-            );
-        }
-        if self.stamps > 1 && *first_secs == 0.0 && *last_secs == 0.0 {
-            let rule =
-                format!("the stamps of {topic} are all 0: the times of the recording are used");
-            report.record(Treatment::Guessed, rule, "", "");
-        }
+        let sources: Vec<(&str, &[Timing])> =
+            self.clocks.iter().map(|(topic, clock)| (&**topic, clock.timings())).collect();
+        offsets::record_rates(&sources, report);
+        offsets::record_differences(&sources, report);
     }
 }

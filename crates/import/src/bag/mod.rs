@@ -18,7 +18,6 @@
 pub mod cdr;
 pub mod messages;
 
-mod beams;
 mod clean;
 mod clock;
 mod content;
@@ -31,6 +30,8 @@ mod storage;
 mod streams;
 #[cfg(test)]
 mod tests;
+mod topic_clock;
+mod topic_motion;
 mod topics;
 
 use std::collections::BTreeMap;

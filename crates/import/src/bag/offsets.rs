@@ -114,16 +114,15 @@ fn run_as_recorded(timings: &[Timing]) -> bool {
     Rate::of(timings).is_some_and(|rate| rate.is_of_recording())
 }
 
-/// Names streams whose stamps do not run as the recording does.
-pub(super) fn add_rates(streams: &[Stream<'_>], report: &mut ImportReport) {
+/// Names sources whose stamps do not run as the recording does.
+pub(super) fn record_rates(sources: &[(&str, &[Timing])], report: &mut ImportReport) {
     let mut names = Vec::new();
     let mut first_rate = None;
-    for stream in streams {
-        let timings = stream.timings();
-        let other = Rate::of(&timings).filter(|rate| !rate.is_of_recording());
+    for (name, timings) in sources {
+        let other = Rate::of(timings).filter(|rate| !rate.is_of_recording());
         if let (Some(rate), true) = (other, timings.len() >= MIN_MESSAGES) {
             first_rate.get_or_insert(rate.ratio);
-            names.push(&*stream.name);
+            names.push(name);
         }
     }
     if let (Some(rate), Some(name)) = (first_rate, names.first()) {
@@ -131,12 +130,32 @@ pub(super) fn add_rates(streams: &[Stream<'_>], report: &mut ImportReport) {
             0 => String::new(),
             n => format!(" and {n} more"),
         };
-        let value = format!(
+        let rule = format!(
             "the stamps of {name}{others} run {rate:.2} times as fast as the recording, as those of a simulation or of a bag \
              that is played do: by it is not told whether their clock was set forward or differs from others"
         );
-        report.add_fact("clock", value);
+        report.record(Treatment::Noted, rule, "", "");
     }
+}
+
+/// A stamp further ahead of the previous one, without as much time in between, is from a clock that was set forward,
+/// such as from 1970 to the present.
+const MAX_FORWARD_STEP_SECS: f64 = 3600.0;
+
+/// Returns the messages, with the steps in s, at which stamps jump ahead: by the times of the recording, or, where it has
+/// none, by themselves.
+pub(super) fn forward_steps(timings: &[Timing]) -> Vec<(usize, f64)> {
+    let mut items: Vec<usize> = forward_jumps(timings).into_iter().map(|(item, _)| item).collect();
+    for (k, pair) in timings.windows(2).enumerate() {
+        let step_secs = pair[1].t_secs - pair[0].t_secs;
+        let recorded_secs = pair[1].log_secs - pair[0].log_secs;
+        if step_secs > MAX_FORWARD_STEP_SECS && recorded_secs < 0.5 * step_secs {
+            items.push(k + 1);
+        }
+    }
+    items.sort_unstable();
+    items.dedup();
+    items.into_iter().map(|item| (item, timings[item].t_secs - timings[item - 1].t_secs)).collect()
 }
 
 /// Returns the messages, with the steps in s, from which on stamps are ahead of the recording by more than ever before:
@@ -261,6 +280,33 @@ pub(super) fn compare_clocks(streams: &mut [Stream<'_>], report: &mut ImportRepo
                 "the stamps of {name} are {:.3} s {side} those of {other} by the times of the recording: their clocks \
                  differ, or its messages came late",
                 excess_secs.abs()
+            );
+            let remedy =
+                "synchronize the clocks of the machines, and record again, if the clocks differ";
+            report.record(Treatment::Suspicious, rule, "", remedy);
+        }
+    }
+}
+
+/// Names sources whose stamps are further behind the recording than those of others, in whatever years their clocks are.
+/// Those that are ahead of it are not named here.
+pub(super) fn record_differences(sources: &[(&str, &[Timing])], report: &mut ImportReport) {
+    let offset = |timings: &[Timing]| {
+        let is_known = timings.len() >= MIN_MESSAGES && run_as_recorded(timings);
+        usual_offset(timings).filter(|_| is_known)
+    };
+    let offsets: Vec<Option<f64>> = sources.iter().map(|(_, timings)| offset(timings)).collect();
+    let nearest = (0..sources.len())
+        .filter_map(|s| Some((s, offsets[s]?)))
+        .min_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs()));
+    let Some((reference, reference_secs)) = nearest else { return };
+    for (s, (name, _)) in sources.iter().enumerate() {
+        let Some(excess_secs) = offsets[s].map(|secs| secs - reference_secs) else { continue };
+        if excess_secs < -MIN_OFFSET_SECS {
+            let rule = format!(
+                "the stamps of {name} are {:.3} s behind those of {} by the times of the recording: their clocks differ, or \
+                 its messages came late",
+                -excess_secs, sources[reference].0
             );
             let remedy =
                 "synchronize the clocks of the machines, and record again, if the clocks differ";

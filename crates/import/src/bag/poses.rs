@@ -22,6 +22,8 @@ pub(super) const SCHEMAS: [&str; 5] = [
 ];
 /// Minimum norm of a quaternion: programs without an orientation write zeros, and a norm near 0 has lost its digits.
 const MIN_NORM: f64 = 1e-3;
+/// A norm further from 1 is none that rounding leaves.
+const NORM_TOLERANCE: f64 = 0.01;
 
 /// A pose at a time, of one frame in another.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +37,8 @@ pub(super) struct StampedPose {
     /// Empty where the message does not give it.
     pub(super) child: Arc<str>,
     pub(super) pose: Pose3,
+    /// Whether its orientation had another norm than 1.
+    pub(super) was_scaled: bool,
 }
 
 impl StampedPose {
@@ -42,7 +46,7 @@ impl StampedPose {
         let t_secs = header.stamp.secs();
         let pose = Pose3 { at_m: pose.position, turn: pose.orientation };
         let [parent, child] = [&header.frame_id, &child].map(|name| frame_name(name));
-        Self { message: 0, log_secs: 0.0, t_secs, parent, child, pose }
+        Self { message: 0, log_secs: 0.0, t_secs, parent, child, pose, was_scaled: false }
     }
 
     fn from_transform(transform: TransformStamped) -> Self {
@@ -60,6 +64,7 @@ impl StampedPose {
             return Err("its orientation is 0, 0, 0, 0, which is none");
         }
         self.pose.turn = self.pose.turn.map(|q| q / norm);
+        self.was_scaled = (norm - 1.0).abs() > NORM_TOLERANCE;
         Ok(self)
     }
 

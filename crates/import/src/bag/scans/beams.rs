@@ -17,10 +17,6 @@ impl BeamSet {
         self.words[word] |= 1 << (beam % BITS);
     }
 
-    pub(super) fn clear(&mut self) {
-        self.words.clear();
-    }
-
     /// Returns the number of beams.
     pub(super) fn len(&self) -> u64 {
         self.words.iter().map(|word| u64::from(word.count_ones())).sum()
@@ -48,7 +44,5 @@ mod tests {
         let mut beams = BeamSet::default();
         [3, 4, 4, 63, 64, 200].iter().for_each(|beam| beams.insert(*beam));
         assert_eq!((beams.len(), beams.runs()), (5, 3));
-        beams.clear();
-        assert_eq!((beams.len(), beams.runs()), (0, 0));
     }
 }
