@@ -17,18 +17,7 @@ const MAX_UNDECLARED: usize = 16;
 
 /// Returns the text of the XML file at `path`: UTF-8, or UTF-16 if the file begins with its byte order mark.
 pub(super) fn read_xml_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
-    let bytes = read_bytes(path, max_bytes)?;
-    let unit: fn([u8; 2]) -> u16 = match bytes.get(..2) {
-        Some([0xff, 0xfe]) => u16::from_le_bytes,
-        Some([0xfe, 0xff]) => u16::from_be_bytes,
-        _ => return decode_text(path, bytes),
-    };
-    let units = bytes[2..].chunks(2).map(|pair| unit([pair[0], *pair.get(1).unwrap_or(&0)]));
-    let text: Result<String, _> = char::decode_utf16(units).collect();
-    text.map_err(|_| {
-        let cause = "begins as a text in UTF-16, and is none";
-        InputError::new(path.display(), cause, "save the file as UTF-8")
-    })
+    decode_text(path, read_bytes(path, max_bytes)?)
 }
 
 /// The maximum depth of elements in each other; a model has some ten, and a scene of nodes some dozens.

@@ -27,7 +27,7 @@ pub fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, InputError> {
     Ok(bytes)
 }
 
-/// Returns the content of a UTF-8 text file, read by [`read_bytes`], without a byte order mark.
+/// Returns the content of a text file, UTF-8 or UTF-16 with a byte order mark, read by [`read_bytes`], without that mark.
 ///
 /// # Errors
 /// Those of [`read_bytes`], and bytes that are not UTF-8, with their line and column.
@@ -36,12 +36,18 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, InputError> {
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
-/// Returns the bytes of a file as text.
+/// Returns the bytes of a file as text: UTF-8, or UTF-16 where they begin with its byte order mark.
 ///
 /// # Errors
-/// When they are not UTF-8: a binary file is named for what it is, and in a text of another encoding the error points at
+/// When they are neither: a binary file is named for what it is, and in a text of another encoding the error points at
 /// the first byte that does not fit.
 pub fn decode_text(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
+    if let Some(text) = decode_utf16(&bytes) {
+        return text.ok_or_else(|| {
+            let cause = "begins as a text in UTF-16, and is none";
+            InputError::new(path.display(), cause, "save the file as UTF-8")
+        });
+    }
     String::from_utf8(bytes).map_err(|error| {
         if let Some(error) = packed_error(path, error.as_bytes()) {
             return error;
@@ -56,8 +62,21 @@ pub fn decode_text(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
     })
 }
 
+/// Returns the text of a file in UTF-16, which its byte order mark tells: `None` for anything else, `Some(None)` for one
+/// that is damaged.
+fn decode_utf16(bytes: &[u8]) -> Option<Option<String>> {
+    let unit: fn([u8; 2]) -> u16 = match bytes.get(..2)? {
+        [0xff, 0xfe] => u16::from_le_bytes,
+        [0xfe, 0xff] => u16::from_be_bytes,
+        _ => return None,
+    };
+    let pairs = bytes[2..].chunks(2);
+    let units = pairs.map(|pair| unit([pair[0], *pair.get(1).unwrap_or(&0)]));
+    Some(char::decode_utf16(units).collect::<Result<String, _>>().ok())
+}
+
 /// The first bytes of binary files that people have beside their scenarios, and what these are.
-const SIGNATURES: [(&[u8], &str); 18] = [
+const SIGNATURES: [(&[u8], &str); 16] = [
     (b"PAR1", "a Parquet file"),
     (b"\x89MCAP", "an MCAP file"),
     (b"#ROSBAG V", "a bag of ROS 1"),
@@ -74,8 +93,6 @@ const SIGNATURES: [(&[u8], &str); 18] = [
     (b"BZh", "compressed with bzip2"),
     (b"\xfd7zXZ", "compressed with xz"),
     (b"%PDF", "a PDF document"),
-    (b"\xff\xfe", "a text in UTF-16"),
-    (b"\xfe\xff", "a text in UTF-16"),
 ];
 
 /// Number of bytes in which a zero tells that a file is no text.
@@ -215,12 +232,21 @@ mod tests {
     }
 
     #[test]
+    fn text_in_utf_16_is_read_by_its_byte_order_mark() {
+        for bytes in [b"\xff\xfea\0\xe4\0".as_slice(), b"\xfe\xff\0a\0\xe4"] {
+            assert_eq!(read_text(file_with(bytes).path(), 100).as_deref(), Ok("a\u{e4}"));
+        }
+        let error =
+            read_text(file_with(b"\xff\xfe\0\xd8").path(), 100).expect_err("half a character");
+        assert!(error.cause().contains("UTF-16, and is none"), "{error}");
+    }
+
+    #[test]
     fn a_binary_file_is_named_and_not_printed() {
         for (bytes, format) in [
             (b"PAR1\x15\x04\xff\x00".as_slice(), "a Parquet file"),
             (b"\x89PNG\r\n\x1a\n\0", "a PNG image"),
             (b"SQLite format 3\0\x10\0\xff", "an SQLite database"),
-            (b"\xff\xfea\0", "a text in UTF-16"),
             (b"what\0\xff", "a binary file"),
         ] {
             let file = file_with(bytes);
