@@ -378,7 +378,13 @@ impl CsvTable {
             quote_names(&missing),
             describe_columns(&known, &other)
         );
-        let remedy = "rename the columns that mean these, with numbers in the unit that the name has, or add them";
+        let has_one_column =
+            matches!(&self.header[..], [all] if missing.iter().all(|name| all.contains(name)));
+        let remedy = if has_one_column {
+            "separate the columns by commas, semicolons or tabs"
+        } else {
+            "rename the columns that mean these, with numbers in the unit that the name has, or add them"
+        };
         Err(InputError::new(&self.place, cause, remedy).with_position(self.header_line, 1))
     }
 
@@ -405,6 +411,11 @@ impl<'a> CsvRow<'a> {
         // Quotes and trimmed blanks are not kept, so the column may be off by these.
         let before: usize = (0..index).map(|i| self.text(i).chars().count() + 1).sum();
         Token { text: self.text(index), line: self.line(), column: before + 1 }
+    }
+
+    /// Returns the name of the file in errors.
+    pub fn place(&self) -> &'a str {
+        &self.table.place
     }
 
     /// Returns the line of the row, from 1.

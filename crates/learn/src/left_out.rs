@@ -77,7 +77,10 @@ impl LeftOut {
 /// Returns the number of rows with another number of fields that may be among those chosen: nothing tells of which robot,
 /// effector or sensor they are, so these have their share of them, rounded up.
 pub(crate) fn misfits_among(table: &CsvTable, chosen: usize) -> u64 {
-    let all = table.rows().count().max(1) as u64;
+    let all = table.rows().count() as u64;
+    if all == 0 {
+        return table.misfits().len() as u64;
+    }
     (table.misfits().len() as u64 * chosen as u64).div_ceil(all)
 }
 

@@ -73,6 +73,8 @@ pub(super) fn learn(
     }
     report.warnings.extend(damage);
     report.warnings.extend(radian_warning(&free));
+    report.warnings.extend(side_warning(&free));
+    report.warnings.extend(meter_warning(&free, box_m));
     report.judge_left_out(free.len() as u64);
     Ok(LearnedEffector {
         report,
@@ -96,6 +98,50 @@ fn radian_warning(displacements: &[MeasuredDisplacement]) -> Option<String> {
     let usual = *turns.get(turns.len() / 2)?;
     (turns.len() >= MIN_TURNS && QUARTER_TURN_IN_RADIANS.contains(&usual)).then(|| {
         format!("turns to the side are usually of {usual:.2} degrees: the column turn_deg looks like radians")
+    })
+}
+
+/// Turns by as many degrees have a side.
+const SIDED_TURN_DEG: std::ops::RangeInclusive<f64> = 30.0..=150.0;
+
+/// Returns the warning on turns to the side that is not the commanded one.
+fn side_warning(displacements: &[MeasuredDisplacement]) -> Option<String> {
+    let turns: Vec<f64> = displacements
+        .iter()
+        .map(|d| {
+            let side = f64::from(intended_displacement(STANDARD_ACTIONS[d.action]).quarters);
+            side * ((d.turn_deg + 180.0).rem_euclid(360.0) - 180.0)
+        })
+        .filter(|turn| SIDED_TURN_DEG.contains(&turn.abs()))
+        .collect();
+    let wrong = turns.iter().filter(|turn| **turn < 0.0).count();
+    (turns.len() >= MIN_TURNS && 2 * wrong > turns.len()).then(|| {
+        format!(
+            "{wrong} of {} turns go to the side that was not commanded: turn_deg is counterclockwise, above 0 for a turn \
+             to the left",
+            turns.len()
+        )
+    })
+}
+
+/// Moves ahead of at most so many boxes are usual where the table has meters.
+const MAX_USUAL_AHEAD_IN_METERS: f64 = 0.6;
+/// Number of moves from which on their usual length is known.
+const MIN_MOVES: usize = 10;
+
+/// Returns the warning on moves of one box that are usually much shorter than a box.
+fn meter_warning(displacements: &[MeasuredDisplacement], box_m: Option<f64>) -> Option<String> {
+    let is_move = |displacement: &&MeasuredDisplacement| {
+        STANDARD_ACTIONS[displacement.action] == "forward" && displacement.ahead_boxes > 0.0
+    };
+    let mut moves: Vec<f64> = displacements.iter().filter(is_move).map(|d| d.ahead_boxes).collect();
+    moves.sort_by(f64::total_cmp);
+    let usual = *moves.get(moves.len() / 2)?;
+    let is_box = box_m.is_none_or(|box_m| (usual / box_m - 1.0).abs() < 0.25);
+    (moves.len() >= MIN_MOVES && usual <= MAX_USUAL_AHEAD_IN_METERS && is_box).then(|| {
+        format!(
+            "moves ahead are usually of {usual:.2} boxes: the column ahead_boxes looks like meters"
+        )
     })
 }
 

@@ -7,6 +7,7 @@ use crate::left_out;
 use sidestep_error_models::effector::STANDARD_ACTIONS;
 use sidestep_import::table::{CsvRow, CsvTable, Token};
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::shell_quote;
 
 /// A longer displacement is not a single action; two such make the longest path of a profile.
 const MAX_BOXES: f64 = 8.0;
@@ -50,7 +51,7 @@ pub(super) fn parse(table: &CsvTable, options: &EffectorOptions) -> Result<Parse
         rejected: BTreeMap::new(),
         damage: None,
         effector: chosen.effector,
-        box_m: columns.box_m(table, options)?,
+        box_m: columns.box_m(&chosen.rows, options)?,
     };
     let mut first_error = table.misfits().first().map(|misfit| table.misfit_error(*misfit));
     let misfits = left_out::misfits_among(table, chosen.rows.len());
@@ -106,6 +107,12 @@ struct DisplacementColumns {
     box_m: Option<usize>,
 }
 
+/// The box of a row.
+struct OwnBox<'t> {
+    word: Token<'t>,
+    side_m: f64,
+}
+
 /// The rows of one effector.
 struct ChosenRows<'t> {
     rows: Vec<CsvRow<'t>>,
@@ -136,7 +143,7 @@ impl DisplacementColumns {
     ) -> Result<ChosenRows<'t>, InputError> {
         let rows = self.rows_of_robots(table, &options.robots)?;
         let names: BTreeSet<&str> = rows.iter().filter_map(|row| self.effector_of(row)).collect();
-        let listed = names.iter().copied().collect::<Vec<_>>().join(", ");
+        let listed = names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
         let wanted = options.effector.as_deref();
         if let Some(wanted) = wanted
             && !names.contains(wanted)
@@ -150,8 +157,8 @@ impl DisplacementColumns {
         }
         if wanted.is_none() && names.len() > 1 {
             let cause = format!("the table has robots with different effectors: {listed}");
-            let first = names.first().copied().unwrap_or_default();
-            let remedy = format!("choose one of them, e.g. --effector {first}");
+            let first = names.iter().find(|name| !name.is_empty()).copied().unwrap_or_default();
+            let remedy = format!("choose one of them, e.g. --effector {}", shell_quote(first));
             return Err(InputError::new(table.place(), cause, remedy));
         }
         let effector = wanted.or(names.first().copied()).map(String::from);
@@ -181,37 +188,43 @@ impl DisplacementColumns {
         self.effector.map(|column| row.field(column).text)
     }
 
-    /// Returns the side of a box by the table's own column or by the options, which must agree.
+    /// Returns the side of a box by the table's own column or by the options, which must agree. Cells that are none are
+    /// those of damaged rows.
     fn box_m(
         &self,
-        table: &CsvTable,
+        rows: &[CsvRow<'_>],
         options: &EffectorOptions,
     ) -> Result<Option<f64>, InputError> {
-        let Some(column) = self.box_m else { return Ok(options.box_m) };
         let mut side_m = options.box_m;
-        for row in table.rows() {
-            let word = row.field(column);
-            let own_m = word.number(&table.place())?;
-            super::check_box(own_m)?;
+        for row in rows {
+            let Ok(Some(own)) = self.own_box(row) else { continue };
             if let Some(other_m) = side_m
-                && (own_m - other_m).abs() > 1e-9 * other_m
+                && (own.side_m - other_m).abs() > 1e-9 * other_m
             {
-                let cause = format!("a box of {own_m} m beside one of {other_m} m");
-                return Err(word.error(
-                    &table.place(),
-                    cause,
-                    "learn from one size of boxes at a time",
-                ));
+                let cause = format!("a box of {} m beside one of {other_m} m", own.side_m);
+                let remedy = "learn from one size of boxes at a time";
+                return Err(own.word.error(&row.place(), cause, remedy));
             }
-            side_m = Some(own_m);
+            side_m = Some(own.side_m);
         }
         Ok(side_m)
+    }
+
+    /// Returns the box that a row gives, where the table has such a column.
+    fn own_box<'t>(&self, row: &CsvRow<'t>) -> Result<Option<OwnBox<'t>>, InputError> {
+        let Some(column) = self.box_m else { return Ok(None) };
+        let word = row.field(column);
+        let side_m = word.number(&row.place())?;
+        super::check_box(side_m)
+            .map_err(|error| word.error(&row.place(), error.cause().into(), error.remedy()))?;
+        Ok(Some(OwnBox { word, side_m }))
     }
 
     fn read(&self, place: &str, row: CsvRow<'_>) -> Result<Row, InputError> {
         let Some(action) = action(place, row.field(self.action))? else {
             return Ok(Row::OwnAction);
         };
+        self.own_box(&row)?;
         let displacement = MeasuredDisplacement {
             robot: self.robot.map_or(Ok(0), |column| row.field(column).integer(&place))?,
             action,
@@ -226,8 +239,8 @@ impl DisplacementColumns {
     fn has_contact(&self, place: &str, row: CsvRow<'_>) -> Result<bool, InputError> {
         let Some(contact) = self.contact.map(|column| row.field(column)) else { return Ok(false) };
         match contact.text {
-            "no" => Ok(false),
-            "yes" => Ok(true),
+            "no" | "false" | "0" => Ok(false),
+            "yes" | "true" | "1" => Ok(true),
             other => Err(contact.error(&place, format!("contact is `{other}`"), "write yes or no")),
         }
     }

@@ -139,7 +139,7 @@ fn effectors_are_told_apart_and_a_table_may_know_its_box() {
     let text = "effector,box_m,action,ahead_boxes,left_boxes,turn_deg\n\
         slow,0.5,forward,0,0,0\nfast,0.5,forward,1,0,0\nfast,0.5,4,1,0,0\n";
     let error = learned_table(text, 0.0, |options| options).unwrap_err();
-    assert!(error.cause().contains("fast, slow") && error.remedy().contains("--effector fast"));
+    assert!(error.cause().contains("`fast`, `slow`") && error.remedy().contains("--effector fast"));
     let named = |name: &str| {
         let effector = Some(name.to_string());
         learned_table(text, 0.0, |options| EffectorOptions { effector, ..options })
@@ -147,7 +147,7 @@ fn effectors_are_told_apart_and_a_table_may_know_its_box() {
     let model = named("fast").unwrap();
     assert_eq!(model.report.transitions.unwrap().ahead, 1.0);
     assert_eq!((model.profile.box_m, model.report.rejected["own_action"]), (Some(0.5), 1));
-    assert!(named("quick").unwrap_err().remedy().contains("fast, slow"));
+    assert!(named("quick").unwrap_err().remedy().contains("`fast`, `slow`"));
     let effector = Some("fast".to_string());
     let other = |options| EffectorOptions { box_m: Some(0.25), effector, ..options };
     assert!(learned_table(text, 0.0, other).unwrap_err().cause().contains("0.5 m beside"));
@@ -242,11 +242,70 @@ fn an_effector_has_its_share_of_the_rows_whose_own_is_not_known() {
 #[test]
 fn turns_in_radians_are_warned_of() {
     let warnings = |turn: &str| {
-        let rows = format!("left,0,0,{turn}\nright,0,0,-{turn}\n").repeat(5);
+        let turn: f64 = turn.parse().unwrap();
+        let rows = format!("left,0,0,{turn}\nright,0,0,{}\n", -turn).repeat(5);
         learned(&rows, 0.5).unwrap().report.warnings
     };
     assert!(warnings("1.571").iter().any(|w| w.ends_with("turn_deg looks like radians")));
     assert!(!warnings("88").iter().any(|w| w.contains("radians")));
+    assert!(!warnings("88").iter().any(|w| w.contains("not commanded")));
+    let other_side = warnings("-88");
+    assert!(
+        other_side
+            .iter()
+            .any(|w| w.starts_with("10 of 10 turns go to the side that was not commanded")),
+        "{other_side:?}"
+    );
+    // A turn of 270 degrees to the left ends on the right.
+    assert!(warnings("270").iter().any(|w| w.contains("not commanded")));
+}
+
+#[test]
+fn moves_in_meters_are_warned_of() {
+    let warnings = |ahead: &str, box_m: Option<f64>| {
+        let text = format!("{HEAD}{}", format!("forward,{ahead},0,0\n").repeat(20));
+        let options = |options| EffectorOptions { box_m, ..options };
+        learned_table(&text, 0.5, options).unwrap().report.warnings
+    };
+    let has = |warnings: Vec<String>| warnings.iter().any(|w| w.ends_with("looks like meters"));
+    assert!(has(warnings("0.248", None)) && has(warnings("0.248", Some(0.25))));
+    assert!(!has(warnings("0.98", None)) && !has(warnings("0.3", Some(0.5))));
+}
+
+#[test]
+fn a_row_whose_box_is_none_is_damaged_and_the_boxes_of_other_effectors_do_not_count() {
+    let text = format!(
+        "effector,box_m,action,ahead_boxes,left_boxes,turn_deg\n{}fast,,forward,1,0,0\nfast,-1,forward,1,0,0\n\
+         slow,0.5,forward,1,0,0\n",
+        "fast,0.25,forward,1,0,0\n".repeat(8)
+    );
+    let effector = Some("fast".to_string());
+    let chosen = |options| EffectorOptions { effector, ..options };
+    let model = learned_table(&text, 0.5, chosen).unwrap();
+    assert_eq!((model.profile.box_m, model.report.rejected["damaged_row"]), (Some(0.25), 2));
+    let warned = &model.report.warnings;
+    assert!(warned.iter().any(|w| w.contains("10:6: `` is not a finite number")), "{warned:?}");
+}
+
+#[test]
+fn the_remedy_for_several_effectors_is_a_command_that_works() {
+    let head = "effector,action,ahead_boxes,left_boxes,turn_deg\n";
+    let text = format!("{head},forward,1,0,0\nmy wheels,forward,1,0,0\n");
+    let error = learned_table(&text, 0.5, |options| options).unwrap_err();
+    assert!(error.remedy().ends_with("--effector 'my wheels'"), "{error}");
+}
+
+#[test]
+fn a_table_of_which_no_row_fits_its_header_says_so() {
+    // Commas between fields and in numbers.
+    let text = format!("{HEAD}forward,1,0,0,0,0,0\nforward,0,9,0,0,0,0\n");
+    let table = CsvTable::parse_recording(&"f.csv", &text).unwrap();
+    let error = learn(&table, &EffectorOptions::default()).unwrap_err();
+    assert!(error.cause().starts_with("the row has 7 fields, the header 4"), "{error}");
+    let blanks = format!("{}forward 1 0 0\n", HEAD.replace(',', " "));
+    let table = CsvTable::parse_recording(&"f.csv", &blanks).unwrap();
+    let error = learn(&table, &EffectorOptions::default()).unwrap_err();
+    assert!(error.remedy().starts_with("separate the columns"), "{error}");
 }
 
 #[test]
