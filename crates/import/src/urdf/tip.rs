@@ -20,11 +20,13 @@ const TOOL_WORDS: [&str; 7] = ["tool", "tcp", "gripper", "grasp", "effector", "h
 const SHORT_TOOL_WORDS: [&str; 4] = ["ee", "eef", "tip", "tips"];
 
 /// Words in the names of frames of sensors, which are on many hands.
-const SENSOR_WORDS: [&str; 6] = ["cam", "optical", "sensor", "imu", "laser", "depth"];
+const SENSOR_WORDS: [&str; 8] =
+    ["cam", "optical", "sensor", "imu", "laser", "depth", "lidar", "ft_frame"];
 
 impl Model {
     /// Returns the link that is the tip unless another is given: the leaf with the most movable joints on its
-    /// path from the root, of several the first in the file. If that leaf is a finger, it is the hand
+    /// path from the root, of several one that has the name of a tool, then one that has none of a sensor, then the first
+    /// in the file. If that leaf is a finger, it is the hand
     /// that carries the fingers, or the only frame that is fixed to the hand and carries nothing. One finger
     /// alone is told from a wrist by the names of its joint and link, or by that frame's.
     pub fn default_tip(&self) -> usize {
@@ -120,16 +122,29 @@ impl<'a> TipSearch<'a> {
 
     fn farthest_leaf(&self) -> usize {
         let mut best = self.model.root;
-        let mut best_count = 0;
+        let mut best_rank = (0, 0);
         for leaf in self.model.leaves() {
-            let count = self.joints_before[leaf];
+            let rank = (self.joints_before[leaf], self.name_rank(leaf));
             // Any leaf is better than the root, even where no joint moves.
-            if count > best_count || best == self.model.root {
+            if rank > best_rank || best == self.model.root {
                 best = leaf;
-                best_count = count;
+                best_rank = rank;
             }
         }
         best
+    }
+
+    /// Returns how likely the name of a frame is that of a goal: sensors come last.
+    fn name_rank(&self, link: usize) -> u8 {
+        match () {
+            () if self.is_sensor(link) => 0,
+            () if self.is_tool(link) => 2,
+            () => 1,
+        }
+    }
+
+    fn is_sensor(&self, link: usize) -> bool {
+        has_word(&self.model.links[link].to_lowercase(), &SENSOR_WORDS)
     }
 
     /// Returns the parent link of joint `path[k]`, if that joint is a finger's: it moves, other joints
@@ -186,15 +201,16 @@ impl<'a> TipSearch<'a> {
         let mut words = name.split(|c: char| !c.is_alphanumeric());
         let is_tool =
             has_word(&name, &TOOL_WORDS) || words.any(|word| SHORT_TOOL_WORDS.contains(&word));
-        is_tool && !has_word(&name, &SENSOR_WORDS)
+        is_tool && !self.is_sensor(link)
     }
 
-    /// Returns the one frame that is fixed to a hand and carries nothing, or the hand if there is none or
+    /// Returns the one frame that is fixed to a hand and carries nothing, but no sensor's, or the hand if there is none or
     /// more than one.
     fn tool_frame(&self, hand: usize) -> usize {
         let leaves = self.model.leaves().into_iter();
-        let frames: Vec<usize> =
-            leaves.filter(|leaf| self.body[*leaf] == self.body[hand]).collect();
+        let frames: Vec<usize> = leaves
+            .filter(|leaf| self.body[*leaf] == self.body[hand] && !self.is_sensor(*leaf))
+            .collect();
         match frames[..] {
             [frame] => frame,
             _ => hand,
@@ -277,6 +293,18 @@ mod tests {
         assert_eq!(tip(&format!("{arm}, c d revolute, c hand_camera fixed")), "d");
         assert_eq!(tip(&format!("{arm}, c d revolute, c knee fixed")), "d");
         assert_eq!(tip(&format!("{arm}, c d revolute, d tool0 fixed, c tool1 fixed")), "tool0");
+        // A camera on the hand, before the tool and without one.
+        assert_eq!(tip(&format!("{arm}, c camera_link fixed, c moving_jaw revolute")), "c");
+        assert_eq!(
+            tip(&format!("{arm}, c a_mount fixed, a_mount camera_optical fixed, c tool0 fixed")),
+            "tool0"
+        );
+        assert_eq!(tip(&format!("{arm}, c d405_frame fixed, c ee_link fixed")), "ee_link");
+        assert_eq!(
+            tip(&format!("{arm}, c camera_link fixed")),
+            "camera_link",
+            "nothing else is there"
+        );
         // A finger that is the whole robot.
         assert_eq!(tip("a finger1 revolute, finger1 finger2 revolute"), "finger2");
     }
