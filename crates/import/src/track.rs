@@ -307,6 +307,20 @@ pub fn cut_and_report(
     cut.track
 }
 
+/// No robot usually drives as fast as this, in m/s: lengths are in other units then.
+const MAX_USUAL_MPS: f64 = 60.0;
+
+/// Records a usual speed that no robot has.
+pub fn report_speed(place: &str, poses: &[StampedPose2], report: &mut ImportReport) {
+    let [usual_mps, _] = usual_motion(poses);
+    if usual_mps > MAX_USUAL_MPS {
+        let rule = format!(
+            "{place} usually moves at {usual_mps:.0} m/s: its lengths look like millimeters"
+        );
+        report.record(Treatment::Suspicious, rule, "", "give lengths in meters");
+    }
+}
+
 /// Truth that stays equal to the last bit while odometry claims more than this way is hardly measured.
 const MAX_FROZEN_WAY_M: f64 = 3.0;
 
@@ -360,6 +374,20 @@ mod tests {
     fn cut(poses: Vec<StampedPose2>) -> CutTrack {
         let rule = SpeedRule::for_tracks(None, &[&drive(100), &poses]);
         cut_track(poses, &rule)
+    }
+
+    #[test]
+    fn a_drive_in_millimeters_is_suspicious() {
+        let said = |factor: f64| {
+            let mut poses = drive(100);
+            poses.iter_mut().for_each(|pose| pose.position_m[0] *= factor);
+            let mut report = ImportReport::new("log");
+            report_speed("ODOM", &poses, &mut report);
+            report.findings.iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        assert_eq!(said(1.0), [""; 0]);
+        let words = "suspicious: ODOM usually moves at 400 m/s: its lengths look like millimeters";
+        assert!(said(1000.0)[0].starts_with(words), "{:?}", said(1000.0));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Where the poses of one body jump, without keeping them all.
 
 use crate::report::{ImportReport, MAX_PLACES, Treatment};
-use crate::track::{SpeedRule, StampedPose2, describe_jump};
+use crate::track::{SpeedRule, StampedPose2, describe_jump, report_speed};
 
 /// Number of poses by which the usual speed is told: those before and after are others.
 const BLOCK_POSES: usize = 1 << 14;
@@ -14,6 +14,8 @@ pub(super) struct TopicMotion {
     /// The first jumps.
     places: Vec<String>,
     limit_mps: f64,
+    /// What is said of its usual speed.
+    speed: ImportReport,
 }
 
 impl TopicMotion {
@@ -25,6 +27,10 @@ impl TopicMotion {
     }
 
     fn close_block(&mut self) {
+        // The name is known at the end.
+        if self.speed.findings.is_empty() {
+            report_speed("", &self.poses, &mut self.speed);
+        }
         let rule = SpeedRule::for_tracks(None, &[&self.poses]);
         for pair in self.poses.windows(2).filter(|pair| !rule.is_possible(&pair[0], &pair[1])) {
             self.jumps += 1;
@@ -41,6 +47,14 @@ impl TopicMotion {
     /// Records the jumps of a body that has this name.
     pub(super) fn report(&mut self, name: &str, report: &mut ImportReport) {
         self.close_block();
+        for finding in self.speed.findings.drain(..) {
+            report.record(
+                finding.treatment,
+                format!("{name}{}", finding.rule),
+                "",
+                &finding.remedy,
+            );
+        }
         let rule = format!(
             "jumps of {name}, which no robot makes that drives at most {:.2} m/s",
             self.limit_mps

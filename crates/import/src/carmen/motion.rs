@@ -6,7 +6,7 @@ use sidestep_kernel::math::{hypot, wrap_angle};
 use super::messages::{ScanKind, ScanMessage, TimedPose};
 use super::{CarmenMotion, CorrectedLog, LogContent, LogEntry, PoseXyTheta, Scan};
 use crate::report::{ImportReport, Treatment};
-use crate::track::{SpeedRule, StampedPose2, cut_and_report, report_frozen};
+use crate::track::{SpeedRule, StampedPose2, cut_and_report, report_frozen, report_speed};
 use crate::track_pair::report_pair;
 
 /// Poses in a log are rounded to this, in m and rad.
@@ -16,6 +16,8 @@ const MIN_MOVE_M: f64 = 0.01;
 /// A stamp this far back is from a clock that was set back; the time after is moved behind it by whole seconds.
 const MAX_BACKWARD_STEP_SECS: f64 = 0.5;
 const PART_GAP_SECS: f64 = 10.0;
+/// A stamp further ahead of the one before it is from a clock that was set forward, such as from 1970 to the present.
+const MAX_FORWARD_STEP_SECS: f64 = 3600.0;
 /// The share of scans at poses of odometry from which on a log was not corrected.
 const UNCORRECTED_FRACTION: f64 = 0.9;
 
@@ -99,11 +101,18 @@ struct LogClock {
     shift_secs: f64,
     /// The steps back, in s.
     backward_steps_secs: Vec<f64>,
+    /// The steps ahead that no pause of a log explains, in s.
+    forward_steps_secs: Vec<f64>,
 }
 
 impl Default for LogClock {
     fn default() -> Self {
-        Self { latest_secs: f64::NEG_INFINITY, shift_secs: 0.0, backward_steps_secs: Vec::new() }
+        Self {
+            latest_secs: f64::NEG_INFINITY,
+            shift_secs: 0.0,
+            backward_steps_secs: Vec::new(),
+            forward_steps_secs: Vec::new(),
+        }
     }
 }
 
@@ -113,6 +122,9 @@ impl LogClock {
         if step_secs < -MAX_BACKWARD_STEP_SECS {
             self.shift_secs += (PART_GAP_SECS - step_secs).ceil();
             self.backward_steps_secs.push(-step_secs);
+        }
+        if step_secs.is_finite() && step_secs > MAX_FORWARD_STEP_SECS {
+            self.forward_steps_secs.push(step_secs);
         }
         let t_secs = pose.t_secs + self.shift_secs;
         self.latest_secs = self.latest_secs.max(t_secs);
@@ -251,7 +263,13 @@ fn tracks(
         let rule = "stamps that go back: the time after is a part of its own";
         report.record(Treatment::Repaired, rule, format!("by {step_secs:.3} s"), "");
     }
+    for step_secs in &poses.clock.forward_steps_secs {
+        let rule = "stamps that jump ahead: nothing is learned across";
+        report.record(Treatment::Suspicious, rule, format!("by {step_secs:.3} s"), "");
+    }
     let [odometry, truth] = [&poses.odometry, &poses.truth].map(|poses| by_time(poses));
+    report_speed("ODOM", &odometry, report);
+    report_speed("the true poses", &truth, report);
     let rule = SpeedRule::for_tracks(max_speed_mps, &[&odometry, &truth]);
     let odometry = cut_and_report("ODOM", odometry, &rule, report);
     let truth = cut_and_report("the true poses", truth, &rule, report);

@@ -104,6 +104,24 @@ fn true_poses_are_compared_with_the_odometry_beside_them() {
 }
 
 #[test]
+fn a_log_in_millimeters_and_a_clock_that_is_set_forward_are_suspicious() {
+    let said_of = |length: f64, jump_s: f64| {
+        let mut text = String::new();
+        for k in 0..40 {
+            let x = 0.1 * length * f64::from(k);
+            let t_s = 0.3 * f64::from(k) + if k >= 20 { jump_s } else { 0.0 };
+            text += &format!("TRUEPOS {x:.4} 0 0 {:.4} 0 0 {t_s:.3} host {t_s:.3}\n", 0.97 * x);
+        }
+        lines(&read_text(&text).report)
+    };
+    assert_eq!(said_of(1.0, 0.0), [""; 0]);
+    let said = said_of(1000.0, 0.0);
+    assert!(said[0].starts_with("suspicious: ODOM usually moves at 323 m/s"), "{said:?}");
+    let said = said_of(1.0, 1e6);
+    assert!(said[0].starts_with("suspicious: stamps that jump ahead"), "{said:?}");
+}
+
+#[test]
 fn flaser_with_a_second_pose_and_no_odom_is_compared_with_that() {
     let mut text = String::new();
     for k in 0..40 {
