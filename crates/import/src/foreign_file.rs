@@ -13,6 +13,7 @@ use crate::urdf::Model;
 use crate::urdf::srdf::Semantics;
 use crate::{GridOptions, ImportedMap, import_map};
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::shell_path;
 use sidestep_map::UnknownPolicy;
 use sidestep_scenario::file::read_start;
 
@@ -111,10 +112,8 @@ impl ForeignFormat {
             let remedy = "give the .map file that its `mapFile` names, in the folder `maps`";
             return Err(InputError::new(path.display(), cause, remedy));
         }
-        if extension(path) == "dat" && path.parent().is_some_and(is_mrclam_folder) {
-            let cause = "is a part of an MRCLAM data set, which is read as a whole";
-            let remedy = "give the folder of the data set";
-            return Err(InputError::new(path.display(), cause, remedy));
+        if is_mrclam_part(path, &text) {
+            return Err(mrclam_part_error(path));
         }
         Ok(match extension(path).as_str() {
             "yaml" | "yml" if text.contains(BAG_METADATA_KEY) => Some(Self::Bag),
@@ -124,7 +123,7 @@ impl ForeignFormat {
             _ if is_image_content(&start) => Some(Self::Image),
             "map" => Some(Self::CharMap),
             // Any text may end so; a map in characters has no words.
-            "txt" if !has_carmen_message(&text) && !begins_as_traffic(&text) => Some(Self::CharMap),
+            "txt" if is_text_of_map(&text) => Some(Self::CharMap),
             "scen" => Some(Self::Scen),
             "csv" | "tsv" => TableKind::of_text(&text).map(Self::Table),
             "urdf" | "xacro" => Some(Self::Urdf),
@@ -133,6 +132,12 @@ impl ForeignFormat {
             "world" | "inc" => Some(Self::Stage),
             kind if mesh::EXTENSIONS.contains(&kind) => Some(Self::Mesh),
             _ if has_carmen_message(&text) => Some(Self::Carmen),
+            "data" | "dat" if is_table_without_names(&text) => {
+                let cause = "is a table without the names of its columns";
+                let remedy = "write them into its first line, and let its name end with .csv: \
+                              `sidestep learn sensor --help` and `sidestep learn effector --help` list them";
+                return Err(InputError::new(path.display(), cause, remedy));
+            }
             _ => None,
         })
     }
@@ -190,6 +195,54 @@ fn is_of_robot_runners(text: &str) -> bool {
 fn has_carmen_message(text: &str) -> bool {
     let mut firsts = text.lines().filter_map(|line| line.split_ascii_whitespace().next());
     firsts.any(|word| CARMEN_MESSAGES.contains(&word))
+}
+
+/// Number of words from which on a text is one for people.
+const MIN_WORDS: usize = 3;
+
+/// Returns whether a text may be a map in characters: any text may end as one, and a map has no words.
+fn is_text_of_map(text: &str) -> bool {
+    let is_word =
+        |word: &&str| word.len() >= 3 && word.bytes().all(|byte| byte.is_ascii_lowercase());
+    let is_prose = text.split_ascii_whitespace().filter(is_word).count() >= MIN_WORDS;
+    !is_prose && !has_carmen_message(text) && !begins_as_traffic(text)
+}
+
+/// Returns whether a text begins with a row of a table most of whose fields are numbers.
+fn is_table_without_names(text: &str) -> bool {
+    let Some((_, row)) = data_lines(text).next() else { return false };
+    let fields: Vec<&str> = row.split([',', ';', '\t']).map(str::trim).collect();
+    let numbers = fields.iter().filter(|field| field.parse::<f64>().is_ok()).count();
+    numbers >= 2 && 2 * numbers > fields.len()
+}
+
+/// Returns whether a file is one of those that make up a data set of MRCLAM, beside the others or alone.
+fn is_mrclam_part(path: &Path, text: &str) -> bool {
+    let name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    let Some(stem) = name.strip_suffix(".dat") else { return false };
+    let is_of_robot = stem.strip_prefix("Robot").is_some_and(|rest| {
+        ["_Groundtruth", "_Odometry", "_Measurement"].iter().any(|end| rest.ends_with(end))
+    });
+    let is_known = is_of_robot || ["Barcodes", "Landmark_Groundtruth"].contains(&stem);
+    is_known || text.contains("# UTIAS") || path.parent().is_some_and(is_mrclam_folder)
+}
+
+fn mrclam_part_error(path: &Path) -> InputError {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    let cause = "is a part of an MRCLAM data set, which is read as a whole";
+    let remedy = if is_mrclam_folder(folder) {
+        let folder = shell_path(folder);
+        format!(
+            "give the folder of the data set: `sidestep inspect {folder}`, \
+             `sidestep learn effector --mrclam {folder}`"
+        )
+    } else {
+        "put all files of the data set into one folder, Barcodes.dat among them, and give that"
+            .into()
+    };
+    InputError::new(path.display(), cause, remedy)
 }
 
 fn is_mrclam_folder(folder: &Path) -> bool {
@@ -385,7 +438,28 @@ mod tests {
             "Robot1_Odometry.dat",
             &[("Barcodes.dat", b""), ("Robot1_Odometry.dat", b"1 2 3")],
         );
-        assert_eq!(part.expect_err("a part").remedy(), "give the folder of the data set");
+        let part = part.expect_err("a part");
+        assert!(part.remedy().contains("`sidestep learn effector --mrclam "), "{part}");
+        let alone = inspected("Robot1_Odometry.dat", &[("Robot1_Odometry.dat", b"1 2 3")]);
+        let alone = alone.expect_err("a part");
+        assert!(alone.remedy().contains("Barcodes.dat among them"), "{alone}");
+    }
+
+    #[test]
+    fn a_table_without_names_and_a_text_for_people_are_told_from_maps() {
+        let rows = b"0.438,0.498,3.625,Slight-Right-Turn\n0.438,0.498,3.625,Move-Forward\n";
+        let error = inspected("a.data", &[("a.data", rows)]).expect_err("no names");
+        assert!(error.cause().contains("without the names of its columns"), "{error}");
+        let known = |text: &[u8]| {
+            let folder = tempfile::tempdir().expect("a temporary folder");
+            let path = folder.path().join("a.txt");
+            std::fs::write(&path, text).expect("written");
+            ForeignFormat::recognize(&path).expect("a text")
+        };
+        assert_eq!(known(b"Read this first, then the other file.\n"), None);
+        for map in [&b"#####\n#..x#\n#####\n"[..], b"..", b" ## \n"] {
+            assert_eq!(known(map), Some(ForeignFormat::CharMap));
+        }
     }
 
     #[test]

@@ -427,11 +427,16 @@ impl Layout {
             names.iter().take(MAX_LISTED).map(|name| format!("`{name:.40}`")).collect();
         let more = names.len().saturating_sub(MAX_LISTED);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        let cause = format!(
-            "the table lacks {}; its columns are {}{more}",
-            missing.join(", "),
-            listed.join(", ")
-        );
+        let listed = listed.join(", ");
+        if self.columns.iter().all(Option::is_none) {
+            let cause =
+                format!("nothing in it is recorded traffic: its columns are {listed}{more}");
+            let remedy =
+                format!("see `sidestep inspect --help` for other kinds of files; {COLUMN_REMEDY}");
+            return Err(InputError::new(place, cause, remedy));
+        }
+        let cause =
+            format!("the table lacks {}; its columns are {listed}{more}", missing.join(", "));
         Err(InputError::new(place, cause, COLUMN_REMEDY))
     }
 
@@ -591,6 +596,9 @@ mod tests {
             "{error}"
         );
         let other = layout("a,b").unwrap_err();
-        assert!(other.cause().contains("a time") && other.cause().contains("`a`, `b`"), "{other}");
+        let words = "nothing in it is recorded traffic: its columns are `a`, `b`";
+        assert_eq!(other.cause(), words);
+        let part = layout("time,b").unwrap_err();
+        assert!(part.cause().contains("lacks a name of the aircraft"), "{part}");
     }
 }

@@ -393,7 +393,14 @@ fn answers_of_openskys_interface_are_read_as_lists_objects_and_tracks() {
     let track = "{\"icao24\":\"aaaaa1\",\"callsign\":\"ABC1\",\"startTime\":1,\"endTime\":2,\"path\":\
                  [[1533114900,47.0,7.0,10668,90,false],[1533114910,47.0,7.03,10668,90,false]]}";
     assert_eq!(parse(&"track.json", track).unwrap().tracks[0].samples.len(), 2);
-    assert!(parse(&"a.json", "[{\"a\": 1}]").unwrap_err().cause().contains("lacks a time"));
+    let error = parse(&"a.json", "[{\"a\": 1}]").unwrap_err();
+    assert!(
+        error.cause().contains("nothing in it is recorded traffic: its columns are `a`"),
+        "{error}"
+    );
+    assert!(error.remedy().contains("sidestep inspect --help"), "{error}");
+    let error = parse(&"a.json", "[{\"time_s\": 1}]").unwrap_err();
+    assert!(error.cause().contains("lacks a name of the aircraft"), "{error}");
     for wrong in ["[1]", "{\"states\": [", "{\"states\": 1}", "[[[["] {
         let error = parse(&"a.json", wrong).unwrap_err();
         assert!(error.remedy().contains("REST interface"), "{error}");
