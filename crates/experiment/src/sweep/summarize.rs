@@ -354,16 +354,17 @@ fn proportion(values: &[f64], seedless: bool) -> Proportion {
 fn numeric_summary(sample: &Sample, bootstrap: Option<&Bootstrap>) -> NumericSummary {
     let values = &sample.values;
     let sorted = sample.sorted();
+    // Equal values, but for rounding, show no spread: an interval without width would claim that there is none.
+    let is_tied = is_tied(values);
     let mut quantiles = Vec::new();
     for q in QUANTILES {
         if let Some(value) = percentile(&sorted, q) {
-            quantiles.push(Quantile { q, value, interval: quantile_interval(&sorted, q) });
+            let interval = quantile_interval(&sorted, q).filter(|_| !is_tied);
+            quantiles.push(Quantile { q, value, interval });
         }
     }
     let mean = mean(values);
     let sd = sample_sd(values);
-    // Equal values, but for rounding, show no spread: an interval without width would claim that there is none.
-    let is_tied = is_tied(values);
     NumericSummary {
         mean,
         sd,

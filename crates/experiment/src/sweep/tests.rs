@@ -157,6 +157,25 @@ fn counts_that_are_equal_in_all_runs_have_no_interval_without_width() {
 }
 
 #[test]
+fn quantiles_of_equal_runs_have_no_interval_without_width() {
+    let equal = (0..20).map(|run| Some(if run < 10 { 3 } else { 4 })).collect();
+    let delays = (0..20_u8).map(|k| f64::from(k) + 0.5);
+    let metrics = vec![
+        column("largest_group", Role::Metric, ColumnValues::I64(equal)),
+        column("delay_s", Role::Metric, ColumnValues::F64(delays.map(Some).collect())),
+    ];
+    let summary = summed(&two_variants(10, metrics));
+    let intervals = |name| {
+        let MetricValues::Numbers(numbers) = &of(&summary, name).variants[0].values else {
+            panic!("a share")
+        };
+        numbers.quantiles.iter().filter(|quantile| quantile.interval.is_some()).count()
+    };
+    assert_eq!(intervals("largest_group"), 0);
+    assert!(intervals("delay_s") > 0);
+}
+
+#[test]
 fn a_few_pairs_have_an_interval_and_no_p_value_and_a_note_says_so() {
     let values = [1.0, 2.5, 1.5, 2.0, 4.0, 5.0, 4.1, 5.3];
     let metrics = vec![column("delay_s", Role::Metric, numbers(values))];
