@@ -132,10 +132,10 @@ impl ForeignFormat {
             "world" | "inc" => Some(Self::Stage),
             kind if mesh::EXTENSIONS.contains(&kind) => Some(Self::Mesh),
             _ if has_carmen_message(&text) => Some(Self::Carmen),
-            "data" | "dat" if is_table_without_names(&text) => {
-                let cause = "is a table without the names of its columns";
-                let remedy = "write them into its first line, and let its name end with .csv: \
-                              `sidestep learn sensor --help` and `sidestep learn effector --help` list them";
+            "data" | "dat" if is_table(&text) => {
+                let cause = "is a table of another program, whose columns have no known names";
+                let remedy = "give the columns the names that `sidestep learn sensor --help` or \
+                              `sidestep learn effector --help` lists, and let its name end with .csv";
                 return Err(InputError::new(path.display(), cause, remedy));
             }
             _ => None,
@@ -208,12 +208,14 @@ fn is_text_of_map(text: &str) -> bool {
     !is_prose && !has_carmen_message(text) && !begins_as_traffic(text)
 }
 
-/// Returns whether a text begins with a row of a table most of whose fields are numbers.
-fn is_table_without_names(text: &str) -> bool {
-    let Some((_, row)) = data_lines(text).next() else { return false };
-    let fields: Vec<&str> = row.split([',', ';', '\t']).map(str::trim).collect();
-    let numbers = fields.iter().filter(|field| field.parse::<f64>().is_ok()).count();
-    numbers >= 2 && 2 * numbers > fields.len()
+/// Returns whether one of the first two rows of a text is that of a table: fields of which most are numbers.
+fn is_table(text: &str) -> bool {
+    let is_row_of_numbers = |(_, row): (usize, &str)| {
+        let fields: Vec<&str> = row.split([',', ';', '\t']).map(str::trim).collect();
+        let numbers = fields.iter().filter(|field| field.parse::<f64>().is_ok()).count();
+        numbers >= 2 && 2 * numbers > fields.len()
+    };
+    data_lines(text).take(2).any(is_row_of_numbers)
 }
 
 /// Returns whether a file is one of those that make up a data set of MRCLAM, beside the others or alone.
@@ -446,10 +448,13 @@ mod tests {
     }
 
     #[test]
-    fn a_table_without_names_and_a_text_for_people_are_told_from_maps() {
+    fn a_table_of_another_program_and_a_text_for_people_are_told_from_maps() {
         let rows = b"0.438,0.498,3.625,Slight-Right-Turn\n0.438,0.498,3.625,Move-Forward\n";
-        let error = inspected("a.data", &[("a.data", rows)]).expect_err("no names");
-        assert!(error.cause().contains("without the names of its columns"), "{error}");
+        let named = [b"S1,S2,S3,OUTPUT\n".as_slice(), rows].concat();
+        for rows in [&rows[..], &named] {
+            let error = inspected("a.data", &[("a.data", rows)]).expect_err("no known names");
+            assert!(error.cause().starts_with("is a table of another program"), "{error}");
+        }
         let known = |text: &[u8]| {
             let folder = tempfile::tempdir().expect("a temporary folder");
             let path = folder.path().join("a.txt");

@@ -310,15 +310,18 @@ pub fn cut_and_report(
 /// No robot usually drives as fast as this, in m/s: lengths are in other units then.
 const MAX_USUAL_MPS: f64 = 60.0;
 
-/// Records a usual speed that no robot has.
-pub fn report_speed(place: &str, poses: &[StampedPose2], report: &mut ImportReport) {
+/// Returns the usual speed in m/s where it is one that no robot has.
+pub(crate) fn absurd_speed_mps(poses: &[StampedPose2]) -> Option<f64> {
     let [usual_mps, _] = usual_motion(poses);
-    if usual_mps > MAX_USUAL_MPS {
-        let rule = format!(
-            "{place} usually moves at {usual_mps:.0} m/s: its lengths look like millimeters"
-        );
-        report.record(Treatment::Suspicious, rule, "", "give lengths in meters");
-    }
+    (usual_mps > MAX_USUAL_MPS).then_some(usual_mps)
+}
+
+/// Records a usual speed that no robot has.
+pub(crate) fn record_absurd_speed(place: &str, speed_mps: Option<f64>, report: &mut ImportReport) {
+    let Some(speed_mps) = speed_mps else { return };
+    let rule =
+        format!("the usual speed of {place} is {speed_mps:.0} m/s: lengths look like millimeters");
+    report.record(Treatment::Suspicious, rule, "", "give lengths in meters");
 }
 
 /// Truth that stays equal to the last bit while odometry claims more than this way is hardly measured.
@@ -382,11 +385,11 @@ mod tests {
             let mut poses = drive(100);
             poses.iter_mut().for_each(|pose| pose.position_m[0] *= factor);
             let mut report = ImportReport::new("log");
-            report_speed("ODOM", &poses, &mut report);
+            record_absurd_speed("ODOM", absurd_speed_mps(&poses), &mut report);
             report.findings.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
         assert_eq!(said(1.0), [""; 0]);
-        let words = "suspicious: ODOM usually moves at 400 m/s: its lengths look like millimeters";
+        let words = "suspicious: the usual speed of ODOM is 400 m/s: lengths look like millimeters";
         assert!(said(1000.0)[0].starts_with(words), "{:?}", said(1000.0));
     }
 

@@ -47,7 +47,9 @@ use self::messages::LaserScan;
 pub use self::scans::NoEcho;
 pub use self::topics::{PoseTopic, TopicSelection};
 use crate::report::ImportReport;
-use crate::track::{SpeedRule, Track, cut_and_report, report_frozen, report_speed};
+use crate::track::{
+    SpeedRule, Track, absurd_speed_mps, cut_and_report, record_absurd_speed, report_frozen,
+};
 use crate::track_pair;
 
 /// The content that was read.
@@ -103,8 +105,8 @@ pub fn read(path: &Path, selection: &TopicSelection) -> Result<BagLog, InputErro
     let odometry_topic = selection.odometry.as_ref().map_or("odometry", |source| &*source.topic);
     let truth_topic = &*selection.truth.topic;
     track_pair::check_units(&bag, [(odometry_topic, &odometry), (truth_topic, &truth.poses)])?;
-    report_speed(truth_topic, &truth.poses, &mut report);
-    report_speed(odometry_topic, &odometry, &mut report);
+    record_absurd_speed(truth_topic, absurd_speed_mps(&truth.poses), &mut report);
+    record_absurd_speed(odometry_topic, absurd_speed_mps(&odometry), &mut report);
     let rule = SpeedRule::for_tracks(selection.max_speed_mps, &[&truth.poses, &odometry]);
     let truth = cut_and_report(truth_topic, truth.poses, &rule, &mut report);
     let odometry = cut_and_report(odometry_topic, odometry, &rule, &mut report);

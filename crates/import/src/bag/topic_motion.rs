@@ -1,7 +1,7 @@
 //! Where the poses of one body jump, without keeping them all.
 
 use crate::report::{ImportReport, MAX_PLACES, Treatment};
-use crate::track::{SpeedRule, StampedPose2, describe_jump, report_speed};
+use crate::track::{SpeedRule, StampedPose2, absurd_speed_mps, describe_jump, record_absurd_speed};
 
 /// Number of poses by which the usual speed is told: those before and after are others.
 const BLOCK_POSES: usize = 1 << 14;
@@ -14,8 +14,8 @@ pub(super) struct TopicMotion {
     /// The first jumps.
     places: Vec<String>,
     limit_mps: f64,
-    /// What is said of its usual speed.
-    speed: ImportReport,
+    /// Its usual speed, where no robot has it.
+    absurd_mps: Option<f64>,
 }
 
 impl TopicMotion {
@@ -27,10 +27,7 @@ impl TopicMotion {
     }
 
     fn close_block(&mut self) {
-        // The name is known at the end.
-        if self.speed.findings.is_empty() {
-            report_speed("", &self.poses, &mut self.speed);
-        }
+        self.absurd_mps = self.absurd_mps.or_else(|| absurd_speed_mps(&self.poses));
         let rule = SpeedRule::for_tracks(None, &[&self.poses]);
         for pair in self.poses.windows(2).filter(|pair| !rule.is_possible(&pair[0], &pair[1])) {
             self.jumps += 1;
@@ -47,14 +44,7 @@ impl TopicMotion {
     /// Records the jumps of a body that has this name.
     pub(super) fn report(&mut self, name: &str, report: &mut ImportReport) {
         self.close_block();
-        for finding in self.speed.findings.drain(..) {
-            report.record(
-                finding.treatment,
-                format!("{name}{}", finding.rule),
-                "",
-                &finding.remedy,
-            );
-        }
+        record_absurd_speed(name, self.absurd_mps, report);
         let rule = format!(
             "jumps of {name}, which no robot makes that drives at most {:.2} m/s",
             self.limit_mps
@@ -94,6 +84,11 @@ mod tests {
             "{far:?}"
         );
         assert!(far[0].contains("at 1638.400 s: 3.05 m"), "{far:?}");
+        let in_millimeters = said(200, |k| 50.0 * f64::from(k));
+        assert!(
+            in_millimeters[0].starts_with("suspicious: the usual speed of /truth is 500 m/s"),
+            "{in_millimeters:?}"
+        );
         let lost = said(200, |k| if (50..53).contains(&k) { 4.0 } else { 0.0 });
         assert!(lost.len() == 1 && lost[0].contains("(2 times)"), "{lost:?}");
     }

@@ -6,7 +6,9 @@ use sidestep_kernel::math::{hypot, wrap_angle};
 use super::messages::{ScanKind, ScanMessage, TimedPose};
 use super::{CarmenMotion, CorrectedLog, LogContent, LogEntry, PoseXyTheta, Scan};
 use crate::report::{ImportReport, Treatment};
-use crate::track::{SpeedRule, StampedPose2, cut_and_report, report_frozen, report_speed};
+use crate::track::{
+    SpeedRule, StampedPose2, absurd_speed_mps, cut_and_report, record_absurd_speed, report_frozen,
+};
 use crate::track_pair::report_pair;
 
 /// Poses in a log are rounded to this, in m and rad.
@@ -268,8 +270,8 @@ fn tracks(
         report.record(Treatment::Suspicious, rule, format!("by {step_secs:.3} s"), "");
     }
     let [odometry, truth] = [&poses.odometry, &poses.truth].map(|poses| by_time(poses));
-    report_speed("ODOM", &odometry, report);
-    report_speed("the true poses", &truth, report);
+    record_absurd_speed("ODOM", absurd_speed_mps(&odometry), report);
+    record_absurd_speed("the true poses", absurd_speed_mps(&truth), report);
     let rule = SpeedRule::for_tracks(max_speed_mps, &[&odometry, &truth]);
     let odometry = cut_and_report("ODOM", odometry, &rule, report);
     let truth = cut_and_report("the true poses", truth, &rule, report);
