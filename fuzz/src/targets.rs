@@ -6,7 +6,8 @@ use sidestep::experiment::sweep::Sweep;
 use sidestep::import::table::CsvTable;
 use sidestep::import::urdf::{Model, srdf::Semantics};
 use sidestep::import::{
-    ascii, bag, bluesky, carmen, image::Bitmap, mesh, movingai, mrclam, rosmap, stage, traffic,
+    ForeignFormat, ascii, bag, bluesky, carmen, image::Bitmap, mesh, movingai, mrclam, rosmap,
+    stage, traffic,
 };
 use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
@@ -60,6 +61,7 @@ pub(crate) const TARGETS: &[Target] = &[
     ("bag_clean", |data| {
         drop(bag::write_clean(&file("f.mcap", data), &folder().join("clean.mcap")));
     }),
+    ("inspect", inspected),
     ("cdr", messages),
     ("mrclam", |data| drop(mrclam::read(mrclam_folder(data), None))),
     ("learn_csv", |data| text(data, learned)),
@@ -74,6 +76,22 @@ pub(crate) const TARGETS: &[Target] = &[
     ("packets", packets::among_pilots),
     ("parquet", tabled),
 ];
+
+/// Names of files whose ends tell what they are, or tell nothing.
+const NAMES: [&str; 16] = [
+    "f.txt", "f.csv", "f.tsv", "f.dat", "f.data", "f.json", "f.so6", "f.daa", "f.scn", "f.scen",
+    "f.map", "f.xml", "f.srdf", "f.world", "f.jpg", "f.log",
+];
+
+/// Inspects a file whose first byte chooses its name.
+fn inspected(data: &[u8]) {
+    let Some((first, content)) = data.split_first() else { return };
+    let path = file(NAMES[usize::from(*first) % NAMES.len()], content);
+    match ForeignFormat::recognize(&path) {
+        Ok(Some(format)) => drop(format.inspect(&path)),
+        _ => drop(WORLDS.import_scenario(&path, &Default::default())),
+    }
+}
 
 fn text(data: &[u8], read: impl Fn(&str)) {
     if let Ok(text) = std::str::from_utf8(data) {
