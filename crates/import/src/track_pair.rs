@@ -36,6 +36,8 @@ const MIN_MOVES: usize = 10;
 const MIN_AGREEMENT: f64 = 0.9;
 /// A body that is turned by less, in rad, is turned by accident.
 const MIN_BODY_TURN_RAD: f64 = 0.2;
+/// A body that is turned for a while is turned by more than this, in rad.
+const MIN_PART_TURN_RAD: f64 = 0.6;
 /// A turn of odometry from which on it has a side, in rad.
 const MIN_SIDED_TURN_RAD: f64 = 0.1;
 /// Odometry that has turned by more than this in all, in rad, shows that headings which stay are none.
@@ -216,7 +218,14 @@ impl SampledPair {
                 "give both in frames whose y axis points to the left of x, and z up",
             ));
         }
-        let off_rad = usual_angle(&pairs)?;
+        let angles = self.move_angles();
+        if let Some(rule) = turned_part_rule(&angles, truth_name) {
+            return Some((
+                rule,
+                "cut these times out of the recording: the body was turned, or taken for another",
+            ));
+        }
+        let off_rad = usual_angle(&angles)?;
         (off_rad.abs() > MIN_BODY_TURN_RAD).then(|| {
             let side = if off_rad > 0.0 { "left" } else { "right" };
             let rule = format!(
@@ -246,34 +255,57 @@ impl SampledPair {
         (n >= MIN_COMPARED).then_some(turned_rad)
     }
 
+    /// Returns the angles from the direction of motion by odometry to that by truth, each in its own body, with the times
+    /// in s, where both move without turning.
+    fn move_angles(&self) -> Vec<(f64, f64)> {
+        let starts = (0..self.odometry.len()).step_by(MOVE_STEPS);
+        let times = starts.filter_map(|k| self.displacement_at(k));
+        let angle = |(t_secs, [claimed, real]): (f64, [[f64; 3]; 2])| {
+            let is_move = [claimed, real].iter().all(|motion| {
+                hypot(motion[0], motion[1]) > MIN_MOVE_M && motion[2].abs() < MAX_MOVE_TURN_RAD
+            });
+            let angle_rad = atan2(real[1], real[0]) - atan2(claimed[1], claimed[0]);
+            is_move.then_some((t_secs, angle_rad))
+        };
+        times.filter_map(angle).collect()
+    }
+
+    fn displacement_at(&self, k: usize) -> Option<(f64, [[f64; 3]; 2])> {
+        let motion = |track: &[Option<StampedPose2>]| {
+            Some(displacement(track[k].as_ref()?, track.get(k + MOVE_STEPS)?.as_ref()?))
+        };
+        let t_secs = self.truth[k].as_ref()?.t_secs;
+        Some((t_secs, [motion(&self.odometry)?, motion(&self.truth)?]))
+    }
+
     /// Returns the motions of odometry and truth over the same times.
     fn displacements(&self) -> Vec<[[f64; 3]; 2]> {
-        let last = self.odometry.len().saturating_sub(MOVE_STEPS);
-        let motion = |track: &[Option<StampedPose2>], k: usize| {
-            Some(displacement(track[k].as_ref()?, track[k + MOVE_STEPS].as_ref()?))
-        };
-        let starts = (0..last).step_by(MOVE_STEPS);
-        starts.filter_map(|k| Some([motion(&self.odometry, k)?, motion(&self.truth, k)?])).collect()
+        let starts = (0..self.odometry.len()).step_by(MOVE_STEPS);
+        starts.filter_map(|k| self.displacement_at(k)).map(|(_, motions)| motions).collect()
     }
 }
 
-/// Returns the usual angle from the direction of motion by odometry to that by truth, each in its own body; `None` where
-/// moves do not agree on one.
-fn usual_angle(pairs: &[[[f64; 3]; 2]]) -> Option<f64> {
-    let mut sum = [0.0; 2];
-    let mut n = 0;
-    for [claimed, real] in pairs {
-        let is_move = [claimed, real].iter().all(|motion| {
-            hypot(motion[0], motion[1]) > MIN_MOVE_M && motion[2].abs() < MAX_MOVE_TURN_RAD
-        });
-        if is_move {
-            let angle_rad = atan2(real[1], real[0]) - atan2(claimed[1], claimed[0]);
-            sum = [sum[0] + cos(angle_rad), sum[1] + sin(angle_rad)];
-            n += 1;
-        }
-    }
-    let agreement = hypot(sum[0], sum[1]) / f64::from(n.max(1));
-    (n as usize >= MIN_MOVES && agreement > MIN_AGREEMENT).then(|| atan2(sum[1], sum[0]))
+/// Returns the usual one of angles with times; `None` where they do not agree on one.
+fn usual_angle(angles: &[(f64, f64)]) -> Option<f64> {
+    let [x, y] = [cos as fn(f64) -> f64, sin]
+        .map(|part| angles.iter().map(|(_, angle_rad)| part(*angle_rad)).sum::<f64>());
+    let agreement = hypot(x, y) / angles.len().max(1) as f64;
+    (angles.len() >= MIN_MOVES && agreement > MIN_AGREEMENT).then(|| atan2(y, x))
+}
+
+/// Returns what to say of a truth that looks where the robot drives at times, and elsewhere at others.
+fn turned_part_rule(angles: &[(f64, f64)], truth_name: &str) -> Option<String> {
+    let parts = angles.chunks_exact(MIN_MOVES);
+    let known = parts.filter_map(|part| Some((part[0].0, usual_angle(part)?)));
+    let parts: Vec<(f64, f64)> = known.collect();
+    let is_straight = parts.iter().any(|(_, angle_rad)| angle_rad.abs() <= MIN_BODY_TURN_RAD);
+    let mut turned = parts.iter().filter(|(_, angle_rad)| angle_rad.abs() > MIN_PART_TURN_RAD);
+    let (t_secs, angle_rad) = turned.next().filter(|_| is_straight)?;
+    Some(format!(
+        "the heading by {truth_name} is that in which the robot drives at times, and {:.0} degrees off at others, first about \
+         {t_secs:.3} s",
+        angle_rad.to_degrees().abs()
+    ))
 }
 
 /// Returns the motion between two poses in the frame of the first: ahead and left in m, turn in rad.
@@ -437,6 +469,18 @@ mod tests {
         );
         let blind = said(&drive(|[x, y, _]| [x, y, 0.0], 0.0));
         assert!(blind[0].contains("the heading of /truth never changes"), "{blind:?}");
+    }
+
+    #[test]
+    fn a_truth_that_looks_elsewhere_for_a_while_is_named() {
+        let pose = std::cell::Cell::new(0);
+        let view = |[x, y, heading]: [f64; 3]| {
+            pose.set(pose.get() + 1);
+            [x, y, heading + if pose.get() > 600 { 3.0 } else { 0.0 }]
+        };
+        let flipped = said(&drive(view, 0.0));
+        let words = "suspicious: the heading by /truth is that in which the robot drives at times, and 172 degrees off";
+        assert!(flipped.iter().any(|line| line.starts_with(words)), "{flipped:?}");
     }
 
     #[test]

@@ -45,7 +45,7 @@ pub fn clean_map(path: &Path, image_name: &str) -> Result<[Vec<u8>; 2], InputErr
     let map = load_map(path, boxes)?;
     let size = [map.width(), map.height()];
     let map = MapToWrite {
-        heading,
+        heading: "A map, written anew by sidestep inspect. Its boxes are 1 m wide by assumption: its file does not say it.",
         size,
         resolution_m: map.box_size_m,
         plane: map.plane,
