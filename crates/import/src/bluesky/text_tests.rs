@@ -45,6 +45,22 @@ fn arguments_for_which_a_called_file_has_no_place_are_named() {
 }
 
 #[test]
+fn zones_that_bluesky_forgets_are_kept_and_named() {
+    for (settings, is_named) in [
+        ("ZONER 3\nCDMETHOD STATEBASED", true),
+        ("DTLOOK 60\nASAS ON", true),
+        ("CDMETHOD STATEBASED\nZONER 3\nCDMETHOD STATEBASED", false),
+        ("ZONER 3", false),
+        ("ASAS ON\nASAS OFF\nZONER 3\nASAS ON", true),
+    ] {
+        let text: String = settings.lines().map(|line| format!("00:00:00>{line}\n")).collect();
+        let file = parse(&"f.scn", &format!("{TWO}{text}"));
+        let rule = |found: &crate::report::Finding| found.rule.contains("BlueSky 1.1.1 forgets");
+        assert_eq!(file.report.findings.iter().any(rule), is_named, "{settings}");
+    }
+}
+
+#[test]
 fn a_conflict_that_would_begin_beyond_a_pole_is_refused_and_the_rest_flies() {
     let text = "00:00:00>CRE AAA1,A320,89.9,4.0,090,FL300,270\n\
                 00:00:00>CRECONFS C1,A320,AAA1,90,0,600\n";

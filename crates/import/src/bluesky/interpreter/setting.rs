@@ -19,11 +19,20 @@ pub(super) struct SettingDefaults {
     /// Whether an aircraft has a radius of its own: then all have, and `ZONER` is for new ones only.
     has_own_radius: bool,
     has_wind: bool,
+    detects: bool,
+    /// Whether sizes of zones or a look-ahead are given.
+    has_zones: bool,
 }
 
 impl Default for SettingDefaults {
     fn default() -> Self {
-        Self { zone_radius_nm: 5.0, has_own_radius: false, has_wind: false }
+        Self {
+            zone_radius_nm: 5.0,
+            has_own_radius: false,
+            has_wind: false,
+            detects: false,
+            has_zones: false,
+        }
     }
 }
 
@@ -45,6 +54,10 @@ impl Interpreter {
         match setting {
             Setting::AddedWind(_) => self.defaults.has_wind = true,
             Setting::NoWind | Setting::Reset => self.defaults.has_wind = false,
+            Setting::ZoneRadiusNm(_) | Setting::ZoneHalfHeightFt(_) | Setting::LookAheadS(_) => {
+                self.defaults.has_zones = true;
+            }
+            Setting::Detection(is_on) => self.note_detection(is_on),
             _ => {}
         }
         self.result.traffic.settings.push(TimedSetting {
@@ -54,6 +67,18 @@ impl Interpreter {
             line: self.line,
             setting,
         });
+    }
+
+    /// Names zones that BlueSky forgets: each of its methods has its own, and those given before it is selected stay with
+    /// the one before.
+    fn note_detection(&mut self, is_on: bool) {
+        let is_switched_on = is_on && !self.defaults.detects;
+        self.defaults.detects = is_on;
+        if is_switched_on && self.defaults.has_zones {
+            let rule =
+                "ZONER, ZONEDH or DTLOOK before CDMETHOD or ASAS: kept; BlueSky 1.1.1 forgets them";
+            self.note(Treatment::Guessed, rule, "write CDMETHOD or ASAS in front of them");
+        }
     }
 
     /// `ZONER radius[,aircraft,...]` and `ZONEDH height[,aircraft,...]`. Without a value they are queries.

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::flight::SeparationMinima;
 use sidestep_import::bluesky::{AircraftCommand, AircraftSetting, ScnAircraft, ScnFile};
-use sidestep_import::local_plane::LatLon;
+use sidestep_import::local_plane::{LatLon, LocalPlane};
 use sidestep_kernel::{InputError, math};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -135,6 +135,10 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, context: FlightCont
         way_points =
             path_of_heading(aircraft.position(), aircraft.heading_deg, v_m_s, UNROUTED_FLIGHT_S);
     }
+    if !is_routed_late(aircraft) && is_first_passed_at_start(aircraft, &way_points) {
+        // A leg without a length has nothing abeam of it: the aircraft flies there, wherever it is.
+        way_points.insert(0, way_points[0]);
+    }
     let way_points_deg = positions_text(&way_points);
     let ordered_m_s = orders.iter().filter_map(|(_, command)| match command {
         FlightCommand::Speed(v_m_s) => Some(*v_m_s),
@@ -160,6 +164,25 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, context: FlightCont
         let _ = writeln!(text, "  {{ at_s = {at_s:?}, {} }},", command.text());
     }
     text.push_str("]\n");
+}
+
+/// Returns whether an aircraft has its first way-point behind it where it is created, and beside the leg that leads on:
+/// without the leg that leads to it, it would count as passed abeam. In BlueSky the leg to the first one begins where the
+/// aircraft is, and it flies back.
+fn is_first_passed_at_start(aircraft: &ScnAircraft, way_points: &[LatLon]) -> bool {
+    let [first, second, ..] = way_points else { return false };
+    let [east_m, north_m] = LocalPlane::centered_at(aircraft.position()).to_plane_m(*first);
+    let (sin, cos) = math::sin_cos(aircraft.heading_deg.to_radians());
+    let leg_m = LocalPlane::centered_at(*first).to_plane_m(*second);
+    let from_first_m = LocalPlane::centered_at(*first).to_plane_m(aircraft.position());
+    let is_beyond = from_first_m[0] * leg_m[0] + from_first_m[1] * leg_m[1] > 0.0;
+    is_beyond && east_m * sin + north_m * cos <= 0.0
+}
+
+/// Returns whether an aircraft has a route, and is given it after its creation, at a place that is not known beforehand.
+fn is_routed_late(aircraft: &ScnAircraft) -> bool {
+    let first_s = route_command_times_s(aircraft).first().copied();
+    first_s.is_some_and(|first_s| first_s > aircraft.created_s + LOOK_EVERY_S)
 }
 
 /// Writes the settings of its own that an aircraft has from the start.
@@ -190,11 +213,9 @@ fn flight_commands(
 ) -> Vec<(f64, FlightCommand)> {
     let mut orders: Vec<(f64, FlightCommand)> = Vec::new();
     let mut routed_s: Vec<f64> = route_command_times_s(aircraft);
-    let is_routed_late =
-        routed_s.first().is_some_and(|first_s| *first_s > aircraft.created_s + LOOK_EVERY_S);
     // A path along the heading is one over the ground, from which a wind would drive an aircraft off.
     let drifts = !has_route && !winds.is_empty();
-    if drifts || (has_route && is_routed_late) {
+    if drifts || (has_route && is_routed_late(aircraft)) {
         orders.push((aircraft.created_s, FlightCommand::Heading(90.0 - aircraft.heading_deg)));
     }
     routed_s.retain(|at_s| has_route && *at_s > aircraft.created_s);
@@ -425,6 +446,28 @@ mod tests {
         // Where it is in BlueSky 1.1.1 after 300 s.
         let off_deg = [lat_rad.to_degrees() - 52.3657, lon_rad.to_degrees() - 4.5197];
         assert!(off_deg.iter().all(|deg| deg.abs() < 0.005), "{off_deg:?}");
+    }
+
+    /// In BlueSky the leg to the first way-point begins where the aircraft is created.
+    #[test]
+    fn a_first_way_point_behind_an_aircraft_is_flown_back_to_as_in_bluesky() {
+        for (first, is_behind) in [("52,3.5", true), ("52,4.5", false)] {
+            let text = format!(
+                "00:00:00>CRE A1,A320,52,4,90,FL300,270\n00:00:00>ADDWPT A1,{first}\n\
+                 00:00:00>ADDWPT A1,52,6\n"
+            );
+            let text = from_bluesky("b", &parse(&"b.scn", &text)).expect("it has aircraft");
+            let method = ["airspace.method=\"none\"".to_string()];
+            let source = Source::new("b", text, "").with_overrides(&method).expect("a method");
+            let mut run = airspace_run(&source, 1).expect("a scenario");
+            let mut west_deg = f64::INFINITY;
+            for _ in 0..40 {
+                run.advance(10);
+                let lon_rad = run.state().airplanes[0].pose().at[0];
+                west_deg = west_deg.min(lon_rad.to_degrees());
+            }
+            assert_eq!(west_deg < 3.6, is_behind, "{first}: {west_deg}");
+        }
     }
 
     #[test]
