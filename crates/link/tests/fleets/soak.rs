@@ -1,8 +1,9 @@
-//! Fleets for an hour, or for a given time, with random kills, stops and partitions from a seed.
+//! Fleets for an hour, or for a given time, with random kills, stops, silent cuts and partitions from a seed.
 //!
 //! `SIDESTEP_SOAK_S` is the number of seconds (60 if not set), `PROPTEST_RNG_SEED` the seed. The same seed gives the
 //! same faults at the same times; everything between them is up to the machine.
 
+use crate::cuts::{Cut, RoutedMachines};
 use crate::processes::{LinkProcess, folder, job, try_signal, wait_until_gone};
 use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::kernel::{EntityId, Seed};
@@ -12,18 +13,31 @@ use std::time::{Duration, Instant};
 
 const AIRPLANES: EntityId = 6;
 
+/// Airplanes on the server's machine, which it starts again; the others are on another machine, where there can be one.
+const NEAR: EntityId = 3;
+
 /// Seconds of the scenario in a second: four cycles.
 const SPEED: f64 = 20.0;
 
 /// Longest time in which a node does not fly: a stop, the lease, the longest wait before it is started again, and joining.
 const MAX_ABSENCE: Duration = Duration::from_secs(60);
 
-/// A fault of a node.
+/// A fault of a node, or of the link between the machines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
     Kill,
     Stop(Duration),
+    Cut(Cut, Duration),
 }
+
+/// A stop in place of a kill.
+const SHORT_STOP: Duration = Duration::from_millis(500);
+
+/// Longest cut, in milliseconds: longer than the lease and all timeouts of links.
+const MAX_CUT_MS: u32 = 12_000;
+
+/// Time at the end without a new cut, so that all are told the end.
+const CALM_END: Duration = Duration::from_secs(10);
 
 /// All faults, from a seed.
 #[derive(Debug, PartialEq)]
@@ -52,7 +66,13 @@ impl FaultPlan {
                 break;
             }
             let stop = Fault::Stop(Duration::from_millis(100 + u64::from(how_long % 4_900)));
-            let fault = if what % 2 == 0 { Fault::Kill } else { stop };
+            let cut_time = Duration::from_millis(1_000 + u64::from(how_long % MAX_CUT_MS));
+            let fault = match what % 6 {
+                0..2 => Fault::Kill,
+                2..4 => stop,
+                _ if at + cut_time + CALM_END > lasts => stop,
+                _ => Fault::Cut(Cut::ALL[what as usize / 6 % Cut::ALL.len()], cut_time),
+            };
             faults.push((at, who % AIRPLANES, fault));
         }
         let seconds = (lasts.as_secs_f64() * SPEED) as u64;
@@ -148,9 +168,16 @@ fn own_memory_kb(process: u32) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Lets the faults happen, and returns the fleet at the end of the time.
-fn fly(program: &LinkProcess, plan: &FaultPlan, lasts: Duration) -> FleetStatus {
+/// Lets the faults happen, and returns the fleet at the end of the time. Without machines nothing is cut.
+fn fly(
+    program: &LinkProcess,
+    machines: Option<&RoutedMachines>,
+    plan: &FaultPlan,
+    lasts: Duration,
+) -> FleetStatus {
     let mut faults = plan.faults.iter().peekable();
+    let mut cuts = 0;
+    let mut present_cut: Option<(Instant, Cut)> = None;
     let mut stopped: Vec<(Instant, u32)> = Vec::new();
     let mut watch = ResourceMonitor::new();
     let began = Instant::now();
@@ -169,18 +196,35 @@ fn fly(program: &LinkProcess, plan: &FaultPlan, lasts: Duration) -> FleetStatus 
             }
             !is_over
         });
+        if let (Some(machines), Some((_, cut))) =
+            (machines, present_cut.take_if(|(until, _)| *until <= Instant::now()))
+        {
+            machines.cut(cut, false);
+        }
         while let Some((_, airplane, fault)) = faults.next_if(|(at, ..)| *at <= began.elapsed()) {
+            if let Fault::Cut(cut, time) = *fault {
+                if let (Some(machines), None) = (machines, present_cut) {
+                    machines.cut(cut, true);
+                    present_cut = Some((Instant::now() + time, cut));
+                    cuts += 1;
+                }
+                continue;
+            }
             let node = &now.nodes[*airplane as usize];
             let Some(process) = node.process.filter(|_| node.state != "gone") else { continue };
-            let is_there = match fault {
-                Fault::Kill => try_signal(process, "KILL"),
-                Fault::Stop(_) => try_signal(process, "STOP"),
+            // Nobody starts a node of the other machine again.
+            let is_killed = *fault == Fault::Kill && (machines.is_none() || *airplane < NEAR);
+            let is_there = try_signal(process, if is_killed { "KILL" } else { "STOP" });
+            let fault = match fault {
+                Fault::Kill if !is_killed => &Fault::Stop(SHORT_STOP),
+                fault => fault,
             };
             if let (Fault::Stop(time), true) = (fault, is_there) {
                 stopped.push((Instant::now() + *time, process));
             }
         }
         if began.elapsed() > lasts {
+            println!("{cuts} silent cuts");
             for (_, process) in stopped {
                 try_signal(process, "CONT");
             }
@@ -210,8 +254,15 @@ fn a_fleet_whose_nodes_are_killed_stopped_and_parted_flies_on_and_stays_apart() 
     let folder = folder(&plan.scenario(lasts));
     let mut job = job(folder.path(), plan.topology, ClockMode::Realtime { speed: SPEED });
     job.common.lease_s = 3.0;
-    let mut program = LinkProcess::start(&Job::Fleet(job));
-    let now = fly(&program, &plan, lasts);
+    let machines = RoutedMachines::new();
+    let (mut program, mut far) = match &machines {
+        Some(machines) => machines.start(job, NEAR, AIRPLANES - NEAR),
+        None => (LinkProcess::start(&Job::Fleet(job)), Vec::new()),
+    };
+    let now = fly(&program, machines.as_ref(), &plan, lasts);
+    for node in &mut far {
+        assert_eq!(node.child.try_wait().expect("a process"), None, "it has ended by itself");
+    }
     drop(program.stdin.take());
     let losses = program.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => {
@@ -221,6 +272,7 @@ fn a_fleet_whose_nodes_are_killed_stopped_and_parted_flies_on_and_stays_apart() 
     });
     assert_eq!(losses, 0);
     assert_eq!(program.end().0, Some(130), "it was told to end");
+    drop(far);
     wait_until_gone(&now, Duration::from_secs(5));
     let sum = |count: fn(&NodeStatus) -> u64| now.nodes.iter().map(count).sum::<u64>();
     let (flown, late, lives) = (sum(|n| n.flown), sum(|n| n.late), sum(|n| n.lives));
