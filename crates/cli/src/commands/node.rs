@@ -19,7 +19,8 @@ Examples:
       --listen tcp/10.0.0.4:0      connector 3 of chain 0
 
 Give it the scenario, --set, --seed and --cycles of the fleet. It runs its agent until the fleet \
-ends, and ends when it has not heard the server for the time of --lease.";
+ends. When it has not heard the server for the time of --lease, it ends in lockstep; in real time \
+it waits for another minute, and takes its place again when the server is back.";
 
 const USAGE: &str = "\
 sidestep node <SCENARIO> --airplane <ID> --connect <ENDPOINT> [OPTIONS]

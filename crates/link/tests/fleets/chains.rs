@@ -115,13 +115,13 @@ fn resumed(mut program: LinkProcess, out: &Path) {
     replay_all(&recorded, 1, &NoWatcher).expect("computed again, to the same digest");
 }
 
-/// Checks that a fleet has waited for a node, said so, and gone on once it was back in another life.
-fn waits_and_goes_on(program: &LinkProcess, again: impl FnOnce()) {
+/// Checks that a fleet has waited for a node, said so, and gone on once it was back, in a number of lives.
+fn waits_and_goes_on(program: &LinkProcess, again: impl FnOnce(), lives: u64) {
     let waits = program.fleet("it is missed", |now| now.waits_for == ["0.2"]);
     assert_eq!((&*waits.nodes[2].state, &*waits.noun), ("gone", "connector"), "{waits:?}");
     again();
     let back = program.fleet("it is back", |now| now.waits_for.is_empty());
-    assert_eq!(back.nodes[2].lives, 2, "{back:?}");
+    assert_eq!(back.nodes[2].lives, lives, "{back:?}");
     // The cycle under way was made without it, and no other cycle.
     assert!(back.cycle >= waits.cycle, "{waits:?} {back:?}");
     program.fleet("it flies again", |now| now.nodes[2].flown > back.nodes[2].flown + 1);
@@ -135,7 +135,7 @@ fn a_chain_stands_while_a_node_that_was_killed_is_started_again_and_says_for_who
     let program = LinkProcess::start(&Job::Fleet(job));
     let now = program.fleet("some cycles", |now| now.cycle >= 1);
     signal(now.nodes[2].process.expect("a process"), "KILL");
-    waits_and_goes_on(&program, || {});
+    waits_and_goes_on(&program, || {}, 2);
     let said = program.logged().join("\n");
     assert!(said.contains("all wait for a node") && said.contains("connector 0.2"), "{said}");
     let out = folder.path().join("run");
@@ -168,7 +168,7 @@ fn a_chain_waits_for_a_node_that_is_stopped_and_comes_out_as_in_one_process_when
 }
 
 #[test]
-fn a_node_that_is_stopped_for_longer_than_its_lease_starts_anew_when_it_goes_on() {
+fn a_node_that_is_stopped_for_longer_than_its_lease_takes_its_place_again_when_it_goes_on() {
     let folder = folder(&two_chains(3, 6_000, ""));
     let job = long(folder.path(), Topology::Star, ClockMode::Lockstep, 1.5);
     let program = LinkProcess::start(&Job::Fleet(job));
@@ -176,7 +176,7 @@ fn a_node_that_is_stopped_for_longer_than_its_lease_starts_anew_when_it_goes_on(
     let stopped = now.nodes[2].process.expect("a process");
     signal(stopped, "STOP");
     program.fleet("its lease is over", |now| now.nodes[2].state == "gone");
-    waits_and_goes_on(&program, || signal(stopped, "CONT"));
+    waits_and_goes_on(&program, || signal(stopped, "CONT"), 1);
 }
 
 #[test]
