@@ -268,10 +268,15 @@ fn read_rows(
     let mut lost = LostRows::default();
     let mut next = 1_i64;
     for _ in 0..max_restarts {
-        let damage = read_from(&mut statement, next, on_row, &mut |row| {
+        // What is missing behind damage was on the damaged page.
+        let mut behind = lost.ranges.last_mut();
+        let is_whole = read_from(&mut statement, next, on_row, &mut |row| {
+            if let Some(range) = behind.take() {
+                range.end = row;
+            }
             next = row.saturating_add(1);
         })?;
-        if damage.is_none() {
+        if is_whole {
             return Ok(lost);
         }
         let Some(readable) = next_readable(&mut statement, next, end) else { break };
@@ -320,33 +325,38 @@ fn next_readable(
 }
 
 fn is_readable(statement: &mut rusqlite::Statement<'_>, row: i64) -> bool {
+    let is_of_order =
+        |found: &rusqlite::Row<'_>| found.get(0).is_ok_and(|number: i64| number >= row);
     let rows = statement.query([row]);
-    rows.is_ok_and(|mut rows| matches!(rows.next(), Ok(Some(_))))
+    rows.is_ok_and(|mut rows| matches!(rows.next(), Ok(Some(found)) if is_of_order(found)))
 }
 
-/// Reads the rows from one on, and returns the damage that ends them, if any.
+/// Reads the rows from one on, and returns whether there are no more: else the next is damaged. A page that a damaged one
+/// names in place of another has rows that were read before.
 fn read_from(
     statement: &mut rusqlite::Statement<'_>,
     from: i64,
     on_row: &mut dyn FnMut(&rusqlite::Row<'_>) -> Result<(), ReadError>,
     on_number: &mut dyn FnMut(i64),
-) -> Result<Option<rusqlite::Error>, ReadError> {
-    let mut rows = match statement.query([from]) {
-        Ok(rows) => rows,
-        Err(damage) => return Ok(Some(damage)),
-    };
+) -> Result<bool, ReadError> {
+    let Ok(mut rows) = statement.query([from]) else { return Ok(false) };
+    let mut least = from;
     loop {
         match rows.next() {
             Ok(Some(row)) => {
-                let Ok(number) = row.get(0) else { continue };
+                let Ok(number) = row.get::<_, i64>(0) else { continue };
+                if number < least {
+                    return Ok(false);
+                }
+                least = number.saturating_add(1);
                 on_number(number);
                 match on_row(row) {
                     Err(ReadError::Database(_)) | Ok(()) => {}
                     Err(error) => return Err(error),
                 }
             }
-            Ok(None) => return Ok(None),
-            Err(damage) => return Ok(Some(damage)),
+            Ok(None) => return Ok(true),
+            Err(_) => return Ok(false),
         }
     }
 }

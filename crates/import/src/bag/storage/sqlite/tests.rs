@@ -70,6 +70,30 @@ fn just_the_rows_on_damaged_pages_are_lost_and_all_of_them_are_counted() {
     assert!(read < 2010 - on_damaged && read + lost_rows == 2010, "{read}, {lost:?}");
 }
 
+/// A page that is named twice has its rows once, and those of the page that is named no more are lost.
+#[test]
+fn rows_of_a_page_that_stands_twice_in_the_file_are_read_once() {
+    const INNER_OF_TABLE: u8 = 0x05;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.db3");
+    let mut bytes = bag(&path);
+    let inner = (PAGE_BYTES..bytes.len())
+        .step_by(PAGE_BYTES)
+        .find(|start| bytes[*start] == INNER_OF_TABLE)
+        .unwrap();
+    let cell = |k: usize| {
+        let at = inner + 12 + 2 * k;
+        inner + usize::from(u16::from_be_bytes([bytes[at], bytes[at + 1]]))
+    };
+    let [from, to] = [cell(10), cell(30)];
+    bytes.copy_within(from..from + 4, to);
+    std::fs::write(&path, &bytes).unwrap();
+    let (read, lost) = read_all(&path, MAX_RESTARTS);
+    let lost: u64 = lost.ranges.iter().map(rows_in).sum();
+    assert!((10..30).contains(&lost), "{lost}");
+    assert_eq!(read + lost, 2010);
+}
+
 fn read_file(path: &Path) -> Result<crate::report::ImportReport, InputError> {
     read_bag(path, &|_| true, &mut |_| Ok(())).map(|storage| storage.report)
 }
