@@ -200,7 +200,7 @@ fn robots_of_different_effectors_are_not_one_table_and_a_run_knows_its_box() {
     let place = mixed_run();
     let refused = place.run(&["learn", "effector", "--run", "r"]);
     assert_eq!(refused.code(), 2);
-    assert!(refused.err().contains("nomad, slick"), "{}", refused.err());
+    assert!(refused.err().contains("`nomad`, `slick`"), "{}", refused.err());
     assert!(refused.err().contains("--effector nomad"), "{}", refused.err());
     let to = ["--effector", "slick", "--profile", "p.toml", "--name", "w"];
     let learned = place.json(&[&["learn", "effector", "--run", "r"], &to[..]].concat());
