@@ -13,7 +13,7 @@ use crate::urdf::Model;
 use crate::urdf::srdf::Semantics;
 use crate::{GridOptions, ImportedMap, import_map};
 use sidestep_kernel::InputError;
-use sidestep_kernel::shell::shell_path;
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_map::UnknownPolicy;
 use sidestep_scenario::file::read_start;
 
@@ -235,11 +235,9 @@ fn mrclam_part_error(path: &Path) -> InputError {
     let folder = folder.unwrap_or(Path::new("."));
     let cause = "is a part of an MRCLAM data set, which is read as a whole";
     let remedy = if is_mrclam_folder(folder) {
-        let folder = shell_path(folder);
-        format!(
-            "give the folder of the data set: `sidestep inspect {folder}`, \
-             `sidestep learn effector --mrclam {folder}`"
-        )
+        let inspect = sidestep_command("inspect", folder);
+        let learn = sidestep_command("learn effector --mrclam", folder);
+        format!("give the folder of the data set: `{inspect}`, `{learn}`")
     } else {
         "put all files of the data set into one folder, Barcodes.dat among them, and give that"
             .into()
