@@ -181,7 +181,8 @@ impl Node {
             return Err(NodeError::ServerSilent(limit.as_secs()));
         }
         if is_alone && !self.is_alone {
-            let (agent, lease_s) = (self.agent, self.lease.as_secs_f64());
+            let agent = self.agent;
+            let lease_s = self.lease.as_secs_f64();
             tracing::warn!(agent, lease_s, "the server is not heard: this node waits for it");
         }
         self.is_alone = is_alone;

@@ -92,10 +92,14 @@ impl FleetServer<'_> {
     pub(super) fn dismiss(&mut self, agent: EntityId, incarnation: Incarnation) {
         let Some(node) = self.nodes.get(&agent) else { return };
         let Some(known) = &node.member else { return };
-        let cause = match known.incarnation == incarnation {
-            true if node.is_lost => "the server considers this node lost",
-            true => return,
-            false => "another node has the place of this one",
+        let has_place = known.incarnation == incarnation;
+        if has_place && !node.is_lost {
+            return;
+        }
+        let cause = if has_place {
+            "the server considers this node lost"
+        } else {
+            "another node has the place of this one"
         };
         let error = JoinError { cause: cause.into(), remedy: "start it again".into() };
         self.messenger.reply(PeerId::Node(agent), incarnation, Message::Refused(error));
