@@ -509,7 +509,8 @@ mod tests {
     /// Links are broken by then, and all processes of a machine that was suspended were stopped together.
     #[test]
     fn who_was_stopped_for_long_takes_nobody_for_silent() {
-        let (second, stop) = (Duration::from_secs(1), RENEWAL_ABSENCE);
+        let second = Duration::from_secs(1);
+        let stop = RENEWAL_ABSENCE;
         for (stop_in_wait, stop_between) in [(stop, Duration::ZERO), (Duration::ZERO, stop)] {
             let clock = Arc::new(Mutex::new(Duration::ZERO));
             let wire = SilentWire { clock: clock.clone(), stop: Duration::ZERO };

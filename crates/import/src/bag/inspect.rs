@@ -148,9 +148,10 @@ impl TopicFindings {
 
     fn add_stamp(&mut self, raw: &RawMessage<'_>, t_secs: f64) {
         let timing = Timing { t_secs, log_secs: log_secs(raw) };
-        match self.clocks.get_mut(raw.topic) {
-            Some(clock) => clock.add(raw.number, timing),
-            None => drop(self.clocks.insert(raw.topic.into(), TopicClock::from_first(timing))),
+        if let Some(clock) = self.clocks.get_mut(raw.topic) {
+            clock.add(raw.number, timing);
+        } else {
+            self.clocks.insert(raw.topic.into(), TopicClock::from_first(timing));
         }
     }
 

@@ -77,8 +77,10 @@ impl RoutedMachines {
 
     /// Connects a machine with the router.
     fn add_link(&self, machine: usize) -> bool {
-        let (router, name) = (&self.router, &self.names[machine]);
-        let (address, gateway) = (ADDRESSES[machine], GATEWAYS[machine]);
+        let router = &self.router;
+        let name = &self.names[machine];
+        let address = ADDRESSES[machine];
+        let gateway = GATEWAYS[machine];
         let words = [
             format!("link add {name} netns {name} type veth peer name {name} netns {router}"),
             format!("-n {name} addr add {address}/24 dev {name}"),
@@ -116,7 +118,8 @@ impl RoutedMachines {
     ) -> (LinkProcess, Vec<LinkProcess>) {
         fleet.nodes = Some(near as usize);
         fleet.listen = vec![format!("tcp/{}:7600", ADDRESSES[0])];
-        let (common, connect) = (fleet.common.clone(), fleet.listen.clone());
+        let common = fleet.common.clone();
+        let connect = fleet.listen.clone();
         let listen = match fleet.topology {
             Topology::Mesh => vec![format!("tcp/{}:0", ADDRESSES[1])],
             Topology::Star => Vec::new(),
@@ -207,7 +210,8 @@ impl CutFlight {
         fleet.common.lease_s = self.lease_s as f64;
         let (mut server, mut far) = machines.start(fleet, HALF as u32, HALF as u32);
         let now = server.fleet("some cycles", |now| now.nodes.iter().all(|node| node.flown > 3));
-        let (start, mut near) = (now.cycle, NearFlight::new(&now));
+        let start = now.cycle;
+        let mut near = NearFlight::new(&now);
         machines.cut(self.cut, true);
         let ends = start + self.lasts_s * CYCLES_PER_S;
         let mut now = now;
@@ -252,22 +256,22 @@ impl CutFlight {
 #[test]
 fn a_silent_cut_leaves_those_that_hear_the_server_in_time_and_all_are_together_again_afterwards() {
     let Some(machines) = RoutedMachines::new() else { return };
-    let (topology, cut) = (Topology::Mesh, Cut::BothWays);
-    CutFlight { topology, lease_s: 10, cut, lasts_s: 5 }.fly(&machines);
+    let topology = Topology::Mesh;
+    CutFlight { topology, lease_s: 10, cut: Cut::BothWays, lasts_s: 5 }.fly(&machines);
 }
 
 #[test]
 fn a_node_that_was_cut_off_for_longer_than_the_lease_takes_its_place_again() {
     let Some(machines) = RoutedMachines::new() else { return };
-    let (topology, cut) = (Topology::Mesh, Cut::BothWays);
-    CutFlight { topology, lease_s: 3, cut, lasts_s: 6 }.fly(&machines);
+    let topology = Topology::Mesh;
+    CutFlight { topology, lease_s: 3, cut: Cut::BothWays, lasts_s: 6 }.fly(&machines);
 }
 
 #[test]
 fn a_silent_cut_of_one_direction_in_a_star_leaves_those_that_hear_the_server_in_time() {
     let Some(machines) = RoutedMachines::new() else { return };
-    let (topology, cut) = (Topology::Star, Cut::ToNear);
-    CutFlight { topology, lease_s: 3, cut, lasts_s: 4 }.fly(&machines);
+    let topology = Topology::Star;
+    CutFlight { topology, lease_s: 3, cut: Cut::ToNear, lasts_s: 4 }.fly(&machines);
 }
 
 #[test]

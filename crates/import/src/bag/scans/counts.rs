@@ -133,12 +133,15 @@ impl RangeCounts {
         let farthest = &self.farthest;
         let is_farthest = self.is_frequent(farthest, MIN_SHARE_AT_FARTHEST)
             && farthest.is_all_around(self.most_beams);
-        let mark = match () {
-            () if is_near_limit => Some(candidate),
-            () if is_farthest => Some(farthest),
-            () => None,
-        };
-        mark.filter(|_| is_limit_free)
+        if !is_limit_free {
+            None
+        } else if is_near_limit {
+            Some(candidate)
+        } else if is_farthest {
+            Some(farthest)
+        } else {
+            None
+        }
     }
 
     fn is_frequent(&self, repeated: &RepeatedRange, min_share: f64) -> bool {

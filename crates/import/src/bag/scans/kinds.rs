@@ -19,7 +19,7 @@ pub(super) enum RangeKind {
     Measured,
     Infinite,
     NotANumber,
-    /// 0 or negative, `-inf` too.
+    /// 0 or negative, but for `-inf`.
     Zero,
     /// `-inf`, or above 0 and no more than the least range, at which nothing is measured but by chance.
     TooNear,
