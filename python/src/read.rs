@@ -5,7 +5,7 @@ use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sidestep::kernel::InputError;
-use sidestep_record::{read_table, tables as tables_of};
+use sidestep_record::{RunReader, read_table, tables as tables_of};
 use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
@@ -38,6 +38,14 @@ pub(crate) fn read<'py>(
     }
     let read: Result<Vec<_>, InputError> = py.detach(|| {
         let names = tables.map_or_else(|| tables_of(&folder), Ok)?;
+        // A folder of tables alone has no list of them.
+        if RunReader::is_at(&folder) {
+            let reader = RunReader::open(&folder)?;
+            let is_read = |file: &str| {
+                file.split_once('/').is_some_and(|(table, _)| names.iter().any(|n| n == table))
+            };
+            reader.check_files(is_read)?;
+        }
         names.into_iter().map(|name| read_table(&folder, &name, ..).map(|t| (name, t))).collect()
     });
     let dict = PyDict::new(py);

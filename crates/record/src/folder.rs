@@ -8,17 +8,16 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{RecordError, TableSchema};
 
 use crate::disk;
+use crate::file_list::{FileList, SharedFileList};
 use crate::manifest::{self, Manifest, Status, json};
 use crate::parquet::ParquetRecorder;
+use crate::replacement::Replacement;
+use crate::run_reader::{
+    CHECKPOINT, LOCK, MANIFEST, RunReader, SCENARIO, SUMMARY, check_is_run, is_result, is_run, read,
+};
 use crate::schema::Provenance;
+use crate::sealed_json::FileDigest;
 use crate::staging::StagingFolder;
-
-/// File name of the manifest.
-pub(crate) const MANIFEST: &str = "run.json";
-const SCENARIO: &str = "scenario.toml";
-const SUMMARY: &str = "summary.json";
-const CHECKPOINT: &str = "checkpoint.bin";
-const LOCK: &str = "run.lock";
 
 /// The description of a new run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,7 +37,8 @@ pub struct NewRun {
 pub enum IfExists {
     /// Leave it alone and fail.
     Refuse,
-    /// Delete it. Folders that hold something other than a run are refused anyway.
+    /// Delete those files that its manifest names, if they are as they were written. A folder in which one was changed,
+    /// or another file is in the way, is refused; other files stay.
     Replace,
 }
 
@@ -57,6 +57,8 @@ pub struct RunFolder {
     path: PathBuf,
     manifest: Manifest,
     scenario: String,
+    /// The files that are written so far; the manifest gets them when it is written.
+    files: SharedFileList,
     /// Locked; the system releases the lock when the process ends in any way.
     _lock: File,
 }
@@ -70,22 +72,40 @@ impl RunFolder {
     /// # Errors
     /// A folder that may not be used; a place where none can be created.
     pub fn create(path: &Path, run: &NewRun, existing: IfExists) -> Result<Self, InputError> {
+        Self::create_with_files(path, run, &[], existing)
+    }
+
+    /// Creates the folder like [`Self::create`], with the files that its scenario names, by their paths in it.
+    ///
+    /// # Errors
+    /// See [`Self::create`].
+    pub fn create_with_files(
+        path: &Path,
+        run: &NewRun,
+        files: &[(String, Vec<u8>)],
+        existing: IfExists,
+    ) -> Result<Self, InputError> {
         check_vacant(path, existing)?;
         let staging = StagingFolder::new(path)?;
         let Provenance { program_version, scenario, seed } = &run.origin;
-        let manifest = Manifest {
+        let mut manifest = Manifest {
             build: Some(run.build.clone()),
             ..manifest::new_manifest(&run.world, *seed, program_version, run.cycles_planned)
         };
-        fill(staging.path(), &manifest, scenario)
+        fill(staging.path(), &mut manifest, scenario, files)
             .map_err(|e| disk::cannot_create(path, format!("{}: {}", e.place, e.cause)))?;
-        // Another process may be writing the run that `commit` deletes: hold its lock until then.
-        let old_lock = if is_run(path) { Some(lock(path)?) } else { None };
-        staging.commit()?;
+        // Another process may be writing the run that `commit` replaces: hold its lock until then.
+        let (old_lock, old) = if is_run(path) {
+            (Some(lock(path)?), Replacement::of_run(path)?)
+        } else {
+            (None, Replacement::default())
+        };
+        staging.commit(&old)?;
         drop(old_lock);
         let lock = lock(path)?;
         let scenario = scenario.clone();
-        Ok(Self { path: path.to_path_buf(), manifest, scenario, _lock: lock })
+        let files = SharedFileList::new(manifest.files.clone());
+        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, _lock: lock })
     }
 
     /// Opens the folder at `path` to continue its run.
@@ -96,13 +116,21 @@ impl RunFolder {
     pub fn resume(path: &Path) -> Result<(Self, ResumePoint), InputError> {
         check_is_run(path)?;
         let lock = lock(path)?;
-        let RunReader { manifest, scenario, .. } = RunReader::open(path)?;
-        if manifest.status == Status::Complete {
+        let reader = RunReader::open(path)?;
+        if reader.manifest.status == Status::Complete {
             let remedy = "read its tables, or start another run in a new folder";
             return Err(InputError::new(path.display(), "the run is complete", remedy));
         }
+        // Results are written anew, so it does not matter what became of them.
+        reader.check_files(|name| !is_result(name))?;
+        let RunReader { manifest, scenario, .. } = reader;
         let point = resume_point(&path.join(CHECKPOINT))?;
-        Ok((Self { path: path.to_path_buf(), manifest, scenario, _lock: lock }, point))
+        let mut files = manifest.files.clone();
+        if !files.contains(SCENARIO) {
+            files.insert(SCENARIO, FileDigest::of_bytes(scenario.as_bytes()));
+        }
+        let files = SharedFileList::new(files);
+        Ok((Self { path: path.to_path_buf(), manifest, scenario, files, _lock: lock }, point))
     }
 
     /// Returns the path of the folder, as it was given.
@@ -135,7 +163,7 @@ impl RunFolder {
             scenario: self.scenario.clone(),
             seed: self.manifest.seed,
         };
-        ParquetRecorder::resume(&self.path, schemas, &origin, cycle)
+        ParquetRecorder::resume_listed(&self.path, schemas, &origin, cycle, &self.files)
     }
 
     /// Replaces the checkpoint by the state before `cycle`.
@@ -146,6 +174,7 @@ impl RunFolder {
     /// An I/O error; the checkpoint before this one stays valid.
     pub fn save_checkpoint(&mut self, cycle: u64, state: &[u8]) -> Result<(), RecordError> {
         disk::replace(&self.path.join(CHECKPOINT), state)?;
+        self.files.lock().insert(CHECKPOINT, FileDigest::of_bytes(state));
         self.update(|manifest| {
             manifest.status = Status::Running;
             manifest.cycles_done = cycle;
@@ -159,7 +188,33 @@ impl RunFolder {
     /// An I/O error, or a summary that is not JSON.
     pub fn write_summary(&self, summary: &impl Serialize) -> Result<(), RecordError> {
         let path = self.path.join(SUMMARY);
-        disk::replace(&path, &json(summary, &path)?)
+        let text = json(summary, &path)?;
+        disk::replace(&path, &text)?;
+        self.files.lock().insert(SUMMARY, FileDigest::of_bytes(&text));
+        Ok(())
+    }
+
+    /// Adds a file that was written into the folder to the manifest, which gets it when it is written next; without
+    /// effect if it is not there.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn add_file(&self, name: &str) -> Result<(), RecordError> {
+        let added = self.files.lock().insert_file(&self.path, name);
+        added.map_err(|e| RecordError::new(self.path.join(name).display(), e))
+    }
+
+    /// Takes the results of an earlier stop out of the manifest: they are about to be written again, and a kill meanwhile
+    /// must leave a folder that is whole.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub fn forget_results(&mut self) -> Result<(), RecordError> {
+        if !self.files.lock().iter().any(|(name, _)| is_result(name)) {
+            return Ok(());
+        }
+        self.files.lock().retain(|name| !is_result(name));
+        self.update(|_| {})
     }
 
     /// Records that the run stopped in good order after `cycles_done` cycles and can be resumed.
@@ -190,50 +245,33 @@ impl RunFolder {
     fn update(&mut self, change: impl FnOnce(&mut Manifest)) -> Result<(), RecordError> {
         let mut changed = self.manifest.clone();
         change(&mut changed);
+        changed.files = self.files.lock().clone();
         changed.write(&self.path.join(MANIFEST))?;
         self.manifest = changed;
         Ok(())
     }
 }
 
-/// A run folder to read from; its run may still be in progress.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RunReader {
-    /// Path of the folder, as it was given.
-    pub path: PathBuf,
-    /// The content of `run.json` when the folder was opened.
-    pub manifest: Manifest,
-    /// The text of `scenario.toml`, with every default and include resolved.
-    pub scenario: String,
-}
-
-impl RunReader {
-    /// Returns whether there is a run in a folder, even if it is damaged.
-    pub fn is_at(path: &Path) -> bool {
-        is_run(path)
-    }
-
-    /// Opens the folder at `path` without locking it.
-    ///
-    /// # Errors
-    /// No run folder; a damaged manifest; another major format.
-    pub fn open(path: &Path) -> Result<Self, InputError> {
-        check_is_run(path)?;
-        let manifest = Manifest::read(&path.join(MANIFEST))?;
-        let scenario = read(&path.join(SCENARIO), |p| fs::read_to_string(p))?;
-        Ok(Self { path: path.to_path_buf(), manifest, scenario })
-    }
-}
-
-fn read<T>(path: &Path, reader: impl FnOnce(&Path) -> std::io::Result<T>) -> Result<T, InputError> {
-    reader(path).map_err(|e| {
-        let remedy = "restore the file, or run the scenario again in a new folder";
-        InputError::new(path.display(), e.to_string(), remedy)
-    })
-}
-
-fn fill(folder: &Path, manifest: &Manifest, scenario: &str) -> Result<(), RecordError> {
+fn fill(
+    folder: &Path,
+    manifest: &mut Manifest,
+    scenario: &str,
+    files: &[(String, Vec<u8>)],
+) -> Result<(), RecordError> {
     disk::replace(&folder.join(SCENARIO), scenario.as_bytes())?;
+    let mut listed = FileList::default();
+    listed.insert(SCENARIO, FileDigest::of_bytes(scenario.as_bytes()));
+    for (name, bytes) in files {
+        let path = folder.join(name);
+        let parent = disk::parent(&path);
+        fs::create_dir_all(parent).map_err(|e| RecordError::new(parent.display(), e))?;
+        disk::write_new(&path, bytes)?;
+        listed.insert(name.as_str(), FileDigest::of_bytes(bytes));
+    }
+    if !files.is_empty() {
+        disk::sync_below(folder)?;
+    }
+    manifest.files = listed;
     manifest.write(&folder.join(MANIFEST))
 }
 
@@ -242,21 +280,6 @@ fn resume_point(checkpoint: &Path) -> Result<ResumePoint, InputError> {
         return Ok(ResumePoint::Start);
     }
     read(checkpoint, |p| fs::read(p)).map(ResumePoint::Checkpoint)
-}
-
-/// Returns whether a folder holds a run, even if its manifest is damaged.
-fn is_run(path: &Path) -> bool {
-    path.join(MANIFEST).is_file()
-}
-
-fn check_is_run(path: &Path) -> Result<(), InputError> {
-    let cause = match fs::metadata(path) {
-        Ok(m) if m.is_dir() && is_run(path) => return Ok(()),
-        Ok(m) if m.is_dir() => format!("this is no run folder: it holds no `{MANIFEST}`"),
-        Ok(_) => "this is no folder".to_string(),
-        Err(e) => e.to_string(),
-    };
-    Err(InputError::new(path.display(), cause, "give the folder that a run was recorded to"))
 }
 
 /// Refuses a path at which a new run must not be created.
@@ -269,22 +292,20 @@ pub(crate) fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputE
     if entries.next().is_none() {
         return Ok(());
     }
-    match (is_run(path), existing) {
-        (true, IfExists::Replace) => Ok(()),
-        (true, IfExists::Refuse) => Err(InputError::new(
-            path.display(),
-            "the folder holds a run already",
-            "resume that run, give another folder, or replace the old run (--replace)",
-        )),
-        (false, _) => {
-            let cause = if path.join(manifest::SWEEP_MANIFEST).is_file() {
-                "the folder holds a sweep"
-            } else {
-                "the folder holds something else than a run"
-            };
-            Err(InputError::new(path.display(), cause, "give a new or empty folder"))
+    let cause = if path.join(manifest::SWEEP_MANIFEST).is_file() {
+        "the folder holds a sweep"
+    } else if is_run(path) {
+        // Some other program's `run.json` does not make a folder one of ours.
+        Manifest::read(&path.join(MANIFEST))?;
+        if existing == IfExists::Replace {
+            return Ok(());
         }
-    }
+        let remedy = "resume that run, give another folder, or replace the old run (--replace)";
+        return Err(InputError::new(path.display(), "the folder holds a run already", remedy));
+    } else {
+        "the folder holds something else than a run"
+    };
+    Err(InputError::new(path.display(), cause, "give a new or empty folder"))
 }
 
 fn lock(folder: &Path) -> Result<File, InputError> {

@@ -15,8 +15,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 
-/// The format that this build writes.
-pub const CURRENT: FormatVersion = FormatVersion { major: 1, minor: 0 };
+/// The format that this build writes. Since 1.1 manifests end with their digest, and list files with theirs.
+pub const CURRENT: FormatVersion = FormatVersion { major: 1, minor: 1 };
 
 /// A format version, `major.minor`; the [module](self) explains what each number guarantees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

@@ -2,9 +2,15 @@
 
 mod disk;
 mod encode;
+mod file_list;
+mod file_manifest;
 mod group;
 mod part;
+mod replacement;
+mod run_content;
+mod run_reader;
 mod schema;
+mod sealed_json;
 mod staging;
 mod table_file;
 
@@ -16,8 +22,11 @@ pub mod parquet;
 pub mod read;
 pub mod run_table;
 pub mod sweep;
+pub mod verify;
 
-pub use folder::{IfExists, NewRun, ResumePoint, RunFolder, RunReader};
+pub use file_list::{DamagedFile, FileFault, FileList, hash_file};
+pub use file_manifest::FileManifest;
+pub use folder::{IfExists, NewRun, ResumePoint, RunFolder};
 pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
 pub use mcap::{
@@ -27,7 +36,9 @@ pub use mcap::{
 };
 pub use parquet::ParquetRecorder;
 pub use read::{Table, for_each_block, read_table, row_count, tables};
+pub use run_reader::RunReader;
 pub use run_table::LoadedTable;
 pub use schema::Provenance;
+pub use sealed_json::{FileDigest, Seal, seal_again};
 pub use staging::resolve_link;
 pub use table_file::TableFileWriter;

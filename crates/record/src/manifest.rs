@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
-use crate::disk;
+use crate::file_list::FileList;
 use crate::format::{self, FormatVersion};
+use crate::sealed_json::{self, Seal};
 
 /// File by which a folder is known as that of a sweep.
 pub(crate) const SWEEP_MANIFEST: &str = "sweep.json";
@@ -49,41 +49,27 @@ pub struct Manifest {
     pub digest: Option<String>,
     /// Cycle of the last checkpoint, if there is one.
     pub last_checkpoint: Option<u64>,
-}
-
-/// The one key that every format has.
-#[derive(Deserialize)]
-struct FormatProbe {
-    format: FormatVersion,
+    /// The other files of the folder, and their digests; of a run in progress, those of its last checkpoint. Folders of
+    /// older versions have none.
+    #[serde(default, skip_serializing_if = "FileList::is_empty")]
+    pub files: FileList,
 }
 
 impl Manifest {
     /// Reads the manifest at `path`.
     ///
     /// # Errors
-    /// A missing file, text that is not a manifest (with line and column), another major format.
-    pub(crate) fn read(path: &Path) -> Result<Self, InputError> {
-        read_json(path)
+    /// A missing file, text that is not a manifest (with line and column), another major format, a wrong digest.
+    pub(crate) fn read(path: &Path) -> Result<(Self, Seal), InputError> {
+        sealed_json::read_sealed(path)
     }
 
-    /// Replaces the manifest at `path` in one step: a reader finds the old or the new one.
-    pub(crate) fn write(&self, path: &Path) -> Result<(), RecordError> {
-        disk::replace(path, &json(self, path)?)
+    /// Replaces the manifest at `path` in one step: a reader finds the old or the new one. It ends with its digest, so
+    /// it says that it is of the format that has one.
+    pub(crate) fn write(&mut self, path: &Path) -> Result<(), RecordError> {
+        self.format = format::CURRENT;
+        sealed_json::write_sealed(path, self)
     }
-}
-
-/// Reads the manifest at `path`, of a run or a sweep.
-///
-/// # Errors
-/// A missing file, text that is not a manifest (with line and column), another major format.
-pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, InputError> {
-    let text = std::fs::read_to_string(path).map_err(|e| {
-        InputError::new(path.display(), e.to_string(), "make the file readable, or restore it")
-    })?;
-    // The version comes first: a newer manifest need not have the keys of this one.
-    let probe: FormatProbe = parse(path, &text)?;
-    probe.format.check_readable(path.display())?;
-    parse(path, &text)
 }
 
 /// Returns indented JSON that ends in a newline.
@@ -92,14 +78,6 @@ pub(crate) fn json(value: &impl Serialize, path: &Path) -> Result<Vec<u8>, Recor
         serde_json::to_vec_pretty(value).map_err(|e| RecordError::new(path.display(), e))?;
     text.push(b'\n');
     Ok(text)
-}
-
-fn parse<'a, T: Deserialize<'a>>(path: &Path, text: &'a str) -> Result<T, InputError> {
-    serde_json::from_str(text).map_err(|e| {
-        let remedy = "the file is damaged: restore it, or run the scenario again in a new folder";
-        let error = InputError::new(path.display(), format!("this is no manifest: {e}"), remedy);
-        if e.line() > 0 { error.with_position(e.line(), e.column().max(1)) } else { error }
-    })
 }
 
 /// Returns the manifest of a run that starts now.
@@ -120,6 +98,7 @@ pub(crate) fn new_manifest(
         cycles_planned,
         digest: None,
         last_checkpoint: None,
+        files: FileList::default(),
     }
 }
 
@@ -132,24 +111,34 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.json");
         std::fs::write(&path, text).unwrap();
-        Manifest::read(&path)
+        Manifest::read(&path).map(|(manifest, _)| manifest)
+    }
+
+    fn manifest() -> Manifest {
+        new_manifest("robots", u64::MAX, "0.1.0", 5)
     }
 
     fn text() -> String {
-        String::from_utf8(
-            json(&new_manifest("robots", u64::MAX, "0.1.0", 5), Path::new("x")).unwrap(),
-        )
-        .unwrap()
+        String::from_utf8(sealed_json::sealed_json(&manifest()).unwrap()).unwrap()
     }
 
     #[test]
     fn a_manifest_survives_its_json() {
-        assert_eq!(read(&text()).unwrap(), new_manifest("robots", u64::MAX, "0.1.0", 5));
+        assert_eq!(read(&text()).unwrap(), manifest());
+    }
+
+    #[test]
+    fn a_manifest_of_an_older_version_is_read_without_digests() {
+        let older = String::from_utf8(json(&manifest(), Path::new("x")).unwrap()).unwrap();
+        let older = older.replace("\"1.1\"", "\"1.0\"");
+        assert_eq!(read(&older).unwrap().format.to_string(), "1.0");
     }
 
     #[test]
     fn a_newer_minor_with_unknown_keys_is_read() {
-        let newer = text().replace("\"1.0\"", "\"1.7\", \"mood\": 3");
+        let newer = text().replace("\"1.1\"", "\"1.7\", \"mood\": 3");
+        assert!(read(&newer).unwrap_err().cause().contains("digest"), "it was edited");
+        let newer = sealed_json::seal_again(&newer);
         assert_eq!(read(&newer).unwrap().format.to_string(), "1.7");
     }
 
@@ -169,6 +158,6 @@ mod tests {
         );
         assert!(read("").is_err());
         assert!(read("{}").is_err());
-        assert!(read(&whole.replace("running", "sleeping")).is_err());
+        assert!(read(&sealed_json::seal_again(&whole.replace("running", "sleeping"))).is_err());
     }
 }

@@ -7,6 +7,7 @@
 //! the cycle at which it starts. So a folder without `.partial` holds every row of the run, and
 //! returning to a checkpoint at cycle C means deleting the parts that start at C or later.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -16,8 +17,10 @@ use sidestep_kernel::ports::recorder::check_block;
 use sidestep_kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
 
 use crate::disk;
+use crate::file_list::{SharedFileList, hash_file};
 use crate::group::RowGroup;
-use crate::part::{PartWriter, error_cause, first_cycle, next_cycle, part_name};
+use crate::part::{PartWriter, error_cause, first_cycle, next_cycle, part_name, parts};
+use crate::read::check_part;
 use crate::schema::{Provenance, check_schema, key_values, parquet_schema};
 
 /// Writes every table to Parquet files; the [module](self) describes their names.
@@ -59,8 +62,22 @@ impl ParquetRecorder {
         origin: &Provenance,
         cycle: u64,
     ) -> Result<Self, RecordError> {
+        Self::resume_listed(folder, schemas, origin, cycle, &SharedFileList::default())
+    }
+
+    /// Continues the tables like [`Self::resume`]. Every part that is complete is in `files`, with its digest.
+    pub(crate) fn resume_listed(
+        folder: &Path,
+        schemas: &[TableSchema],
+        origin: &Provenance,
+        cycle: u64,
+        files: &SharedFileList,
+    ) -> Result<Self, RecordError> {
         schemas.iter().try_for_each(check_schema)?;
-        let tables = schemas.iter().map(|schema| TableWriter::open(folder, schema, origin, cycle));
+        let tables = schemas.iter().map(|schema| {
+            rewind(folder, &schema.name, cycle, files)?;
+            TableWriter::open(folder, schema, origin, cycle, files.clone())
+        });
         Ok(Self { tables: tables.collect::<Result<_, _>>()?, broken: None })
     }
 
@@ -106,6 +123,7 @@ struct TableWriter {
     part: Option<PartWriter>,
     group: RowGroup,
     finished: bool,
+    files: SharedFileList,
 }
 
 impl TableWriter {
@@ -114,11 +132,11 @@ impl TableWriter {
         schema: &TableSchema,
         origin: &Provenance,
         cycle: u64,
+        files: SharedFileList,
     ) -> Result<Self, RecordError> {
         let parquet_schema =
             parquet_schema(schema).map_err(|e| RecordError::new(&schema.name, error_cause(e)))?;
         let folder = parent.join(&schema.name);
-        rewind(&folder, cycle)?;
         Ok(Self {
             group: RowGroup::new(schema, &parquet_schema),
             schema: schema.clone(),
@@ -128,6 +146,7 @@ impl TableWriter {
             part_cycle: cycle,
             part: None,
             finished: false,
+            files,
         })
     }
 
@@ -175,7 +194,17 @@ impl TableWriter {
         if !self.group.is_empty() {
             self.write_row_group()?;
         }
-        self.part.take().map_or(Ok(()), |part| part.close(next_cycle))
+        match self.part.take() {
+            Some(part) => self.close_part(part, next_cycle),
+            None => Ok(()),
+        }
+    }
+
+    fn close_part(&self, part: PartWriter, next_cycle: Option<u64>) -> Result<(), RecordError> {
+        let digest = part.close(next_cycle)?;
+        let name = listed_name(&self.schema.name, &part_name(self.part_cycle));
+        self.files.lock().insert(name, digest);
+        Ok(())
     }
 
     /// Finishes the table and gives its folder the final name. Later calls do nothing.
@@ -187,7 +216,7 @@ impl TableWriter {
         let partial = disk::partial_path(&self.folder);
         if parts(&partial)?.is_empty() {
             // A table without rows still needs a file for its columns.
-            self.new_part()?.close(None)?;
+            self.close_part(self.new_part()?, None)?;
         }
         disk::rename(&partial, &self.folder)?;
         self.finished = true;
@@ -195,12 +224,23 @@ impl TableWriter {
     }
 }
 
-/// Returns the table's folder to its state when the recorder was sealed at `cycle`.
-fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
-    let partial = disk::partial_path(folder);
+/// Returns the path of a part in the list of the run's files.
+fn listed_name(table: &str, part: &str) -> String {
+    format!("{table}/{part}")
+}
+
+/// Returns the folder of a table to its state when the recorder was sealed at `cycle`, and the list of files with it.
+fn rewind(
+    parent: &Path,
+    table: &str,
+    cycle: u64,
+    files: &SharedFileList,
+) -> Result<(), RecordError> {
+    let folder = parent.join(table);
+    let partial = disk::partial_path(&folder);
     if folder.exists() {
         // The run was stopped after this table was finished, but before the last one was.
-        disk::rename(folder, &partial)?;
+        disk::rename(&folder, &partial)?;
     }
     fs::create_dir_all(&partial).map_err(|e| RecordError::new(partial.display(), e))?;
     // This check must come before anything is deleted.
@@ -208,6 +248,22 @@ fn rewind(folder: &Path, cycle: u64) -> Result<(), RecordError> {
     for path in disk::list(&partial)? {
         if is_stale(&path, cycle) {
             fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))?;
+        }
+    }
+    let mut kept = BTreeMap::new();
+    for path in parts(&partial)? {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        kept.insert(listed_name(table, name), path);
+    }
+    let mut files = files.lock();
+    let of_table = format!("{table}/");
+    files.retain(|name| !name.starts_with(&of_table) || kept.contains_key(name));
+    for (name, path) in kept {
+        if !files.contains(&name) {
+            // A kill came between the checkpoint after this part and the manifest.
+            check_part(&path, table).map_err(|e| RecordError::new(e.place(), e.cause()))?;
+            let digest = hash_file(&path).map_err(|e| RecordError::new(path.display(), e))?;
+            files.insert(name, digest);
         }
     }
     Ok(())
@@ -232,16 +288,4 @@ fn is_stale(path: &Path, cycle: u64) -> bool {
         Some(partial) => first_cycle(partial).is_some(),
         None => first_cycle(name).is_some_and(|first| first >= cycle),
     }
-}
-
-/// Returns the complete parts in `folder`, in the order of their rows.
-pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, RecordError> {
-    let mut parts = Vec::new();
-    for path in disk::list(folder)? {
-        if let Some(cycle) = path.file_name().and_then(|n| n.to_str()).and_then(first_cycle) {
-            parts.push((cycle, path));
-        }
-    }
-    parts.sort();
-    Ok(parts.into_iter().map(|(_, path)| path).collect())
 }

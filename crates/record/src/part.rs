@@ -15,7 +15,9 @@ use sidestep_kernel::ports::RecordError;
 
 use crate::disk;
 use crate::encode::ColumnEncoder;
+use crate::file_list::HashedFile;
 use crate::schema;
+use crate::sealed_json::FileDigest;
 
 /// Returns the name of the part with `cycle` as its first cycle; names sort in the order of cycles.
 pub(crate) fn part_name(cycle: u64) -> String {
@@ -27,10 +29,22 @@ pub(crate) fn first_cycle(name: &str) -> Option<u64> {
     name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()
 }
 
+/// Returns the complete parts in `folder`, in the order of their rows.
+pub(crate) fn parts(folder: &Path) -> Result<Vec<PathBuf>, RecordError> {
+    let mut parts = Vec::new();
+    for path in disk::list(folder)? {
+        if let Some(cycle) = path.file_name().and_then(|n| n.to_str()).and_then(first_cycle) {
+            parts.push((cycle, path));
+        }
+    }
+    parts.sort();
+    Ok(parts.into_iter().map(|(_, path)| path).collect())
+}
+
 /// A part that is being written; it has no valid footer before it is closed.
 pub(crate) struct PartWriter {
     path: PathBuf,
-    file: SerializedFileWriter<File>,
+    file: SerializedFileWriter<HashedFile>,
     /// CRC-32 of the bytes of each row group.
     checksums: Vec<u32>,
 }
@@ -51,6 +65,7 @@ impl PartWriter {
             .build();
         let partial = disk::partial_path(&path);
         let file = File::create(&partial).map_err(|e| RecordError::new(partial.display(), e))?;
+        let file = HashedFile::new(file);
         let file = SerializedFileWriter::new(file, schema, Arc::new(properties))
             .map_err(|e| RecordError::new(partial.display(), error_cause(e)))?;
         Ok(Self { path, file, checksums: Vec::new() })
@@ -68,9 +83,12 @@ impl PartWriter {
         Ok(())
     }
 
-    /// Writes the footer, waits for the disk, and gives the file its final name. `next_cycle` is
-    /// the first cycle of the next part; `None` at the end of a run.
-    pub(crate) fn close(self, next_cycle: Option<u64>) -> std::result::Result<(), RecordError> {
+    /// Writes the footer, waits for the disk, gives the file its final name, and returns the digest of its bytes.
+    /// `next_cycle` is the first cycle of the next part; `None` at the end of a run.
+    pub(crate) fn close(
+        self,
+        next_cycle: Option<u64>,
+    ) -> std::result::Result<FileDigest, RecordError> {
         let Self { path, mut file, checksums } = self;
         let checksums = schema::checksums_to_text(&checksums);
         let next_cycle = next_cycle.map_or("end".to_string(), |cycle| cycle.to_string());
@@ -80,8 +98,9 @@ impl PartWriter {
         let partial = disk::partial_path(&path);
         let file =
             file.into_inner().map_err(|e| RecordError::new(partial.display(), error_cause(e)))?;
-        file.sync_all().map_err(|e| RecordError::new(partial.display(), e))?;
-        disk::rename(&partial, &path)
+        let digest = file.close().map_err(|e| RecordError::new(partial.display(), e))?;
+        disk::rename(&partial, &path)?;
+        Ok(digest)
     }
 }
 
@@ -96,7 +115,7 @@ pub(crate) fn next_cycle(path: &Path) -> std::result::Result<Option<u64>, Record
 
 /// Writes a row group and returns the checksum of its bytes.
 fn append_chunks(
-    file: &mut SerializedFileWriter<File>,
+    file: &mut SerializedFileWriter<HashedFile>,
     columns: &mut [ColumnEncoder],
 ) -> Result<u32> {
     let mut checksum = crc32fast::Hasher::new();

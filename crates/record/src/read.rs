@@ -20,8 +20,7 @@ use sidestep_kernel::ports::{
 
 use crate::disk;
 use crate::format::FormatVersion;
-use crate::parquet::parts;
-use crate::part::error_cause;
+use crate::part::{error_cause, parts};
 use crate::schema::{self, Provenance};
 
 /// The column by which rows are chosen.
@@ -324,6 +323,19 @@ impl<'a> PartReader<'a> {
         }
         Ok(columns)
     }
+}
+
+/// Checks the rows of a part against their checksums.
+///
+/// # Errors
+/// A damaged part.
+pub(crate) fn check_part(path: &Path, table: &str) -> Result<(), InputError> {
+    let part = PartReader::open(path, table)?;
+    for group in 0..part.file.num_row_groups() {
+        check_bytes(&part.bytes, part.file.metadata(), group, &part.checksums)
+            .map_err(|e| damaged(path, error_cause(e)))?;
+    }
+    Ok(())
 }
 
 fn decode_error(path: &Path, cause: impl std::fmt::Display) -> InputError {

@@ -28,10 +28,12 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{Cells, ColumnType, ColumnValues, ColumnWithRole, RecordError};
 
 use crate::disk;
+use crate::file_list::HashedFile;
 use crate::format::{self, FormatVersion};
 use crate::part::error_cause;
 use crate::read::{check_bytes, damaged, read_cells, read_texts, required_value};
 use crate::schema::{self, CHECKSUMS, COLUMNS, FORMAT, VERSION};
+use crate::sealed_json::FileDigest;
 
 /// Number of rows in a row group: a row may have hundreds of metrics, all of which are in memory until it is written.
 const GROUP_ROWS: usize = 1 << 16;
@@ -64,9 +66,19 @@ pub fn write<R: Serialize>(
     program_version: &str,
     extra: &[(&str, String)],
 ) -> Result<(), RecordError> {
+    stream(path, columns, program_version, extra)?.finish()
+}
+
+/// Returns a table with the columns, which still has to be finished.
+pub(crate) fn stream<R: Serialize>(
+    path: &Path,
+    columns: &[&ColumnWithRole<R>],
+    program_version: &str,
+    extra: &[(&str, String)],
+) -> Result<TableStream, RecordError> {
     let mut table = TableStream::create(path, columns, program_version, extra)?;
     table.append(columns)?;
-    table.finish()
+    Ok(table)
 }
 
 /// A table that is written block by block, and appears once it is whole; dropped before, it leaves nothing.
@@ -75,7 +87,10 @@ pub struct TableStream {
     partial: PathBuf,
     hash: SharedChecksum,
     checksums: Vec<u32>,
+    /// `None` once the table is complete.
     writer: Option<SerializedFileWriter<HashingWriter>>,
+    /// Of all bytes, once the table is complete.
+    digest: Option<FileDigest>,
 }
 
 impl TableStream {
@@ -95,6 +110,7 @@ impl TableStream {
             hash: SharedChecksum::default(),
             checksums: Vec::new(),
             writer: None,
+            digest: None,
         };
         let pairs = key_values(columns, program_version, extra);
         let writer = pairs.and_then(|pairs| table.start(columns, pairs));
@@ -109,7 +125,8 @@ impl TableStream {
         columns: &[&ColumnWithRole<R>],
         pairs: Vec<KeyValue>,
     ) -> ParquetResult<SerializedFileWriter<HashingWriter>> {
-        let sink = HashingWriter { file: File::create(&self.partial)?, hash: self.hash.clone() };
+        let file = HashedFile::new(File::create(&self.partial)?);
+        let sink = HashingWriter { file, hash: self.hash.clone() };
         let schema = parquet_schema(columns)?;
         let mut writer = SerializedFileWriter::new(sink, schema, Arc::new(properties(pairs)))?;
         writer.flush()?;
@@ -139,17 +156,32 @@ impl TableStream {
         Ok(())
     }
 
+    /// Completes the table under its temporary name; [`finish`](Self::finish) then gives it its name. Returns the digest of
+    /// its bytes, for a manifest that has to be there before the table is.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub fn close(&mut self) -> Result<FileDigest, RecordError> {
+        if let Some(digest) = &self.digest {
+            return Ok(digest.clone());
+        }
+        let Some(mut writer) = self.writer.take() else {
+            return Err(RecordError::new(self.path.display(), "the table is over"));
+        };
+        let checksums = schema::checksums_to_text(&self.checksums);
+        writer.append_key_value_metadata(KeyValue::new(CHECKSUMS.to_string(), checksums));
+        let digest = writer.into_inner().and_then(|sink| Ok(sink.file.close()?));
+        let digest = digest.map_err(|e| self.write_error(e))?;
+        self.digest = Some(digest.clone());
+        Ok(digest)
+    }
+
     /// Completes the table, and gives it its name.
     ///
     /// # Errors
     /// An I/O error. An earlier file stays then.
     pub fn finish(mut self) -> Result<(), RecordError> {
-        if let Some(mut writer) = self.writer.take() {
-            let checksums = schema::checksums_to_text(&self.checksums);
-            writer.append_key_value_metadata(KeyValue::new(CHECKSUMS.to_string(), checksums));
-            let synced = writer.into_inner().and_then(|sink| Ok(sink.file.sync_all()?));
-            synced.map_err(|e| self.write_error(e))?;
-        }
+        self.close()?;
         disk::rename(&self.partial, &self.path)
     }
 
@@ -283,9 +315,8 @@ impl SharedChecksum {
 }
 
 /// A file with bytes that are hashed while they are written.
-#[derive(Debug)]
 struct HashingWriter {
-    file: File,
+    file: HashedFile,
     hash: SharedChecksum,
 }
 

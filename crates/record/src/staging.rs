@@ -8,6 +8,8 @@ use sidestep_kernel::InputError;
 
 use crate::disk;
 use crate::disk::cannot_create;
+use crate::replacement::Replacement;
+use crate::run_content::list_tree;
 
 /// A folder with a temporary name. If it is dropped, it and the parents created for it are deleted.
 pub(crate) struct StagingFolder {
@@ -36,8 +38,6 @@ impl StagingFolder {
 
     fn make(&self) -> io::Result<()> {
         fs::create_dir_all(disk::parent(&self.path))?;
-        // Remains of a killed process with the same id.
-        remove_if_exists(&self.path)?;
         fs::create_dir(&self.path)
     }
 
@@ -45,30 +45,91 @@ impl StagingFolder {
         &self.path
     }
 
-    /// Moves the folder to its place, replacing anything there.
-    pub(crate) fn commit(mut self) -> Result<(), InputError> {
+    /// Moves the folder to its place. What is there is replaced: files that `old` calls own are deleted, all others are in
+    /// the new folder afterwards.
+    pub(crate) fn commit(mut self, old: &Replacement) -> Result<(), InputError> {
         let target = &self.target;
+        let failed = |e: io::Error| cannot_create(target, e);
         // The old folder is kept beside the new one until that is in place: a failure leaves one of them whole.
-        let old = hidden_sibling(target, "old")?;
-        remove_if_exists(&old).map_err(|e| cannot_create(target, e))?;
+        let aside = hidden_sibling(target, "old")?;
         let replaces = target.exists();
+        let mut later = Vec::new();
+        for path in &old.others {
+            // With a second name in the new folder, a file of others has its place there even if this process is killed.
+            if link(&target.join(path), &self.path.join(path)).is_err() {
+                later.push(path);
+            }
+        }
         if replaces {
-            fs::rename(target, &old).map_err(|e| cannot_create(target, e))?;
+            fs::rename(target, &aside).map_err(failed)?;
         }
         if let Err(e) = disk::rename(&self.path, target) {
             if replaces {
-                let _ = fs::rename(&old, target);
+                let _ = fs::rename(&aside, target);
             }
             return Err(cannot_create(target, e.cause));
         }
         self.made.clear();
-        remove_if_exists(&old).map_err(|e| cannot_create(target, e))
+        for path in &later {
+            move_file(&aside.join(path), &target.join(path)).map_err(failed)?;
+        }
+        if replaces {
+            let linked = old.others.iter().filter(|path| !later.contains(path));
+            remove_known(&aside, old.own.iter().chain(linked)).map_err(failed)?;
+        }
+        Ok(())
     }
+}
+
+/// Gives a file a second name, or makes a folder that is empty.
+fn link(from: &Path, to: &Path) -> io::Result<()> {
+    fs::create_dir_all(disk::parent(to))?;
+    if from.is_dir() && !from.is_symlink() {
+        return fs::create_dir_all(to);
+    }
+    fs::hard_link(from, to)
+}
+
+/// Moves a file of others to the new folder; for file systems where a file has only one name.
+fn move_file(from: &Path, to: &Path) -> io::Result<()> {
+    fs::create_dir_all(disk::parent(to))?;
+    fs::rename(from, to)
+}
+
+/// Deletes the given files of a folder, and the folders that are empty then. A file that came meanwhile stays, and with it
+/// its folder.
+fn remove_known<'a>(folder: &Path, known: impl Iterator<Item = &'a PathBuf>) -> io::Result<()> {
+    for path in known {
+        let path = folder.join(path);
+        let removed = if path.is_dir() && !path.is_symlink() {
+            fs::remove_dir(&path)
+        } else {
+            fs::remove_file(&path)
+        };
+        match removed {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {}
+            other => other?,
+        }
+    }
+    remove_empty(folder);
+    Ok(())
+}
+
+/// Removes a folder if there is no file below it.
+fn remove_empty(folder: &Path) {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_type().is_ok_and(|ty| ty.is_dir())) {
+        remove_empty(&entry.path());
+    }
+    // Fails, as it should, if the folder is not empty.
+    let _ = fs::remove_dir(folder);
 }
 
 impl Drop for StagingFolder {
     fn drop(&mut self) {
-        let _ = remove_if_exists(&self.path);
+        // Everything in it was written or linked by this process.
+        let all = list_tree(&self.path).unwrap_or_default();
+        let _ = remove_known(&self.path, all.iter());
         for parent in self.made.iter().rev() {
             // Fails, as it should, if the folder is not empty.
             let _ = fs::remove_dir(parent);
@@ -92,16 +153,13 @@ pub fn resolve_link(target: &Path) -> io::Result<PathBuf> {
         .map_err(|e| io::Error::new(e.kind(), format!("a link to what is not there ({e})")))
 }
 
-/// Returns a hidden name in the same folder that no other process uses.
+/// Returns a hidden name in the same folder that nothing has: what a killed process left is not touched.
 fn hidden_sibling(target: &Path, role: &str) -> Result<PathBuf, InputError> {
     let name = target.file_name().ok_or_else(|| cannot_create(target, "it has no name"))?;
     let name = format!(".{}.{role}-{}", name.display(), std::process::id());
-    Ok(disk::parent(target).join(name))
-}
-
-fn remove_if_exists(folder: &Path) -> io::Result<()> {
-    match fs::remove_dir_all(folder) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
-        other => other,
-    }
+    let folder = disk::parent(target);
+    let names = (0..).map(|k| if k == 0 { name.clone() } else { format!("{name}-{k}") });
+    let mut paths = names.map(|name| folder.join(name));
+    let free = paths.find(|path| path.symlink_metadata().is_err());
+    free.ok_or_else(|| cannot_create(target, "no name is free beside it"))
 }

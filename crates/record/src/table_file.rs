@@ -72,7 +72,7 @@ impl TableFileWriter {
         if !self.group.is_empty() {
             self.write_row_group()?;
         }
-        let ended = self.part.take().map_or(Ok(()), |part| part.close(None));
+        let ended = self.part.take().map_or(Ok(()), |part| part.close(None).map(drop));
         ended.inspect_err(|_| drop(std::fs::remove_file(disk::partial_path(&self.path))))
     }
 }

@@ -123,6 +123,7 @@ fn own_recording(path: &Path) -> Result<Option<ImportReport>, Error> {
 
 fn run_report(path: &Path) -> Result<ImportReport, InputError> {
     let run = RunReader::open(path)?;
+    run.check_files(|_| true)?;
     let manifest = &run.manifest;
     let mut report = ImportReport::new("run folder of this program");
     report.add_fact("world", manifest.world.clone());

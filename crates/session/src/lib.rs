@@ -22,6 +22,7 @@
 //! [`Watcher`].
 
 mod compare;
+mod compare_rows;
 mod driver;
 mod error;
 mod files;

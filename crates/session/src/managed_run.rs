@@ -414,7 +414,9 @@ fn store(
         RunStatus::Complete => recording.finish_tables(),
         RunStatus::Incomplete => recording.save_unfinished(run),
     };
-    closed.map_err(|e| storage_error(run, Some(&recording), &e))?;
+    closed
+        .and_then(|()| recording.forget_results())
+        .map_err(|e| storage_error(run, Some(&recording), &e))?;
     let folder = recording.into_folder();
     // The results are worth more than their picture, so its failure is a warning.
     if let Err(error) = picture::draw_run(run, &folder) {
@@ -423,11 +425,22 @@ fn store(
     let per_agent = run.agent_metrics();
     let per_pair = run.pair_metrics();
     folder.write_summary(&SummaryFile { summary, per_agent, per_pair })?;
+    for name in picture::NAMES.into_iter().chain(mcap_in(folder.path(), summary).as_deref()) {
+        folder.add_file(name)?;
+    }
     match summary.status {
         RunStatus::Complete => folder.complete(run.cycle(), &summary.digest)?,
         RunStatus::Incomplete => folder.stop(run.cycle())?,
     }
     Ok(())
+}
+
+/// Returns the name of the MCAP file if it is complete and lies in the run folder itself.
+fn mcap_in(folder: &Path, summary: &Summary) -> Option<String> {
+    let file = summary.mcap.as_deref()?;
+    let inside = resolve_path(file).strip_prefix(resolve_path(folder)).ok()?.to_path_buf();
+    let name = inside.to_str()?;
+    (!name.ends_with(".partial")).then(|| name.to_string())
 }
 
 /// Drives the run; the error of a bug contains the facts to replay it.

@@ -14,6 +14,9 @@ use std::path::Path;
 /// Longer side of a PNG in pixels.
 const PNG_WIDTH_PX: u32 = 1600;
 
+/// The names of the pictures in a run folder.
+pub(crate) const NAMES: [&str; 2] = ["trajectories.svg", "trajectories.png"];
+
 /// Draws the trajectory picture into a run folder, as SVG and PNG.
 ///
 /// # Errors
@@ -25,8 +28,9 @@ pub(crate) fn draw_run(run: &mut dyn Simulation, folder: &RunFolder) -> Result<(
         origin = format!("{origin} INCOMPLETE: {} of {planned} cycles.", run.cycle());
     }
     let svg = draw_svg(run, Some(folder.path()), &origin)?;
-    write_bytes(&folder.path().join("trajectories.svg"), svg.as_bytes())?;
-    write_png(&folder.path().join("trajectories.png"), &svg)
+    let [as_svg, as_png] = NAMES.map(|name| folder.path().join(name));
+    write_bytes(&as_svg, svg.as_bytes())?;
+    write_png(&as_png, &svg)
 }
 
 /// Returns the present state of the run as SVG, with the tracks that its folder has. `origin` is a

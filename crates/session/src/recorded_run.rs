@@ -52,6 +52,7 @@ impl RecordedRun {
 
     fn from_folder(worlds: &Worlds, path: &Path) -> Result<Self, InputError> {
         let view = RunReader::open(path)?;
+        view.check_files(|_| true)?;
         let place = path.join("scenario.toml").display().to_string();
         Ok(Self {
             path: path.to_path_buf(),

@@ -1,6 +1,7 @@
 //! A recorded run computed again: to its end, or up to any cycle.
 
 use crate::compare::compare_poses;
+use crate::compare_rows::RowComparison;
 use crate::driver::{RunTiming, Sinks, drive};
 use crate::picture::{draw_svg, footnote, write_png};
 use crate::{Error, RecordedRun, Watcher};
@@ -16,12 +17,15 @@ pub struct ReplayReport {
     pub effort: RunTiming,
     /// Number of recorded poses of that cycle that were compared.
     pub compared_poses: usize,
+    /// Number of recorded rows that were compared, of all tables.
+    pub compared_rows: u64,
 }
 
-/// Computes the whole run again, and compares its last state with the recorded digest.
+/// Computes the whole run again, and compares its last state with the recorded digest, and all of its rows with the
+/// recorded tables, where there are any.
 ///
 /// # Errors
-/// When no digest is recorded, or it differs; [`Error::Interrupted`] when the watcher asked to
+/// When no digest is recorded, or it differs, or a row does; [`Error::Interrupted`] when the watcher asked to
 /// stop.
 pub fn replay_all(
     recorded: &RecordedRun,
@@ -36,7 +40,12 @@ pub fn replay_all(
     }
     let mut run = recorded.start(workers)?;
     let until = recorded.cycles_done;
-    let effort = drive(run.as_mut(), until, Sinks::default(), watcher)?;
+    let mut rows = recorded.folder.as_ref().map(|_| {
+        run.start_recording();
+        RowComparison::new(run.schemas())
+    });
+    let sinks = Sinks { rows: rows.as_mut().map(|rows| rows as _), ..Sinks::default() };
+    let effort = drive(run.as_mut(), until, sinks, watcher)?;
     if run.cycle() < until && !run.is_over() {
         return Err(Error::Interrupted);
     }
@@ -46,7 +55,11 @@ pub fn replay_all(
         return Err(Error::other(cause, remedy));
     }
     recorded.verify_digest(run.as_ref())?;
-    Ok(ReplayReport { run, effort, compared_poses: 0 })
+    let compared_rows = match (&recorded.folder, &rows) {
+        (Some(folder), Some(rows)) => rows.compare(folder)?,
+        _ => 0,
+    };
+    Ok(ReplayReport { run, effort, compared_poses: 0, compared_rows })
 }
 
 /// Computes the state at the start of a cycle, and compares it with the poses recorded for
@@ -74,7 +87,7 @@ pub fn replay_to(
         Some(folder) => compare_poses(run.as_ref(), recorded.start(workers)?, folder)?,
         None => 0,
     };
-    Ok(ReplayReport { run, effort, compared_poses })
+    Ok(ReplayReport { run, effort, compared_poses, compared_rows: 0 })
 }
 
 fn check_cycle(cycle: Cycle, planned: Cycle) -> Result<(), InputError> {

@@ -47,8 +47,7 @@ impl RunRecorder {
             },
             cycles_planned: plan.cycles,
         };
-        let folder = RunFolder::create(path, &new, existing)?;
-        write_inputs(path, &resolved.files)?;
+        let folder = RunFolder::create_with_files(path, &new, &resolved.files, existing)?;
         Ok(Self::start(folder, run)?)
     }
 
@@ -108,6 +107,14 @@ impl RunRecorder {
 
     pub(crate) fn folder(&self) -> &RunFolder {
         &self.folder
+    }
+
+    /// Takes the results of an earlier stop out of the folder's manifest, before they are written again.
+    ///
+    /// # Errors
+    /// An I/O error.
+    pub(crate) fn forget_results(&mut self) -> Result<(), RecordError> {
+        self.folder.forget_results()
     }
 
     /// Returns the folder, for its last entries.

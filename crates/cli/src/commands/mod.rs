@@ -25,6 +25,7 @@ mod run;
 mod schema;
 mod studio;
 mod sweep;
+mod verify;
 
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
@@ -33,7 +34,7 @@ use clap::Subcommand;
 /// The commands by their use, in the order in which people meet them.
 pub(crate) const GROUPS: &[(&str, &[&str])] = &[
     ("Prepare", &["new", "check", "schema", "inspect", "map", "learn"]),
-    ("Run and look at it", &["run", "studio", "resume", "replay", "report", "export"]),
+    ("Run and look at it", &["run", "studio", "resume", "replay", "verify", "report", "export"]),
     ("Fly on a network", &["fleet", "node"]),
     ("Study", &["sweep", "compare", "exact", "reproduce"]),
     ("Robot arms", &["fk", "ik"]),
@@ -81,6 +82,8 @@ pub(crate) enum Command {
     Reproduce(reproduce::ReproduceArgs),
     /// Compute a recorded run again and compare it with the recording
     Replay(replay::ReplayArgs),
+    /// Check that every file of a run, a sweep or a report is as it was written
+    Verify(verify::VerifyArgs),
     /// Export a recorded run: tables, pictures, animations, recordings
     Export(export::ExportArgs),
     /// Print the completions of a shell
@@ -114,6 +117,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Report(args) => report::report(&args, *console),
         Command::Reproduce(args) => reproduce::reproduce(&args, *console),
         Command::Replay(args) => replay::replay(&args, *console),
+        Command::Verify(args) => verify::verify(&args, *console),
         Command::Export(args) => export::export(&args, *console),
         Command::Completions(args) => completions::completions(&args, *console),
         Command::Man(args) => man::man(&args, *console),

@@ -21,7 +21,7 @@ Examples:
   sidestep replay runs/office --cycle 1234 --json | jq '.bodies[0]'
 
 Without --cycle the whole run is computed again from the recorded scenario, and the digest of \
-its last state is compared with the recorded one. With --cycle the state is computed from the \
+its last state and all rows of its tables are compared with the recorded ones. With --cycle the state is computed from the \
 last checkpoint before the cycle, or from the start, and compared with the recorded poses of \
 that cycle. If they differ, the exit code is 1.";
 
@@ -75,18 +75,23 @@ pub(crate) fn replay(args: &ReplayArgs, console: Console) -> Result<ExitCode, Fa
 }
 
 fn print_end(report: &ReplayReport, is_complete: bool, console: Console) -> Result<(), Failure> {
-    let ReplayReport { run, effort, .. } = report;
+    let ReplayReport { run, effort, compared_rows, .. } = report;
     let digest = run.digest().to_string();
     let json = json!({
         "cycle": run.cycle(),
         "digest": digest,
         "confirmed": true,
         "complete": is_complete,
+        "compared_rows": compared_rows,
         "wall_s": effort.wall.as_secs_f64(),
     });
     console.print_result_or_short(&json, &format!("{digest}\n"), || {
         let cycles = group_thousands(run.cycle());
-        format!("Confirmed: {cycles} cycles give the recorded digest\n  digest {digest}\n")
+        let rows = match compared_rows {
+            0 => String::new(),
+            rows => format!(" and the {} recorded rows", group_thousands(*rows)),
+        };
+        format!("Confirmed: {cycles} cycles give the recorded digest{rows}\n  digest {digest}\n")
     })
 }
 

@@ -85,7 +85,7 @@ fn check(run: &Value, read: &Value, cycles: u64) {
     let metadata = &read["metadata"];
     assert_eq!(metadata["digest"], run["digest"]);
     assert_eq!(metadata["cycles_done"], run["cycles"].to_string());
-    assert_eq!((&metadata["status"], &metadata["format"]), (&json!("complete"), &json!("1.0")));
+    assert_eq!((&metadata["status"], &metadata["format"]), (&json!("complete"), &json!("1.1")));
     assert_eq!(metadata["program_version"], env!("CARGO_PKG_VERSION"));
     assert_eq!(metadata["frames"], (cycles + 1).to_string());
     assert_eq!(metadata["seed"], run["seed"].to_string());
@@ -256,7 +256,7 @@ fn pyarrow_and_polars_read_tables_and_their_exports_alike() {
     });
     assert_eq!(read["types"], types);
     let keys = &read["keys"];
-    assert_eq!((&keys["sidestep.seed"], &keys["sidestep.format"]), (&json!("5"), &json!("1.0")));
+    assert_eq!((&keys["sidestep.seed"], &keys["sidestep.format"]), (&json!("5"), &json!("1.1")));
     assert_eq!(keys["sidestep.scenario"], place.read("r/scenario.toml"));
     assert_eq!(keys["sidestep.next_cycle"], "end");
 }

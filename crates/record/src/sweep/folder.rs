@@ -10,20 +10,27 @@ use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::{Digest, InputError};
 
 use crate::disk;
+use crate::file_list::FileList;
+use crate::file_manifest::FileManifest;
 use crate::folder::check_vacant;
 use crate::format::{self, FormatVersion};
-use crate::manifest::{self, SWEEP_MANIFEST as MANIFEST, json};
+use crate::manifest::SWEEP_MANIFEST as MANIFEST;
+use crate::replacement::Replacement;
+use crate::run_content::list_tree;
 use crate::run_table;
+use crate::sealed_json::{self, Seal};
 use crate::staging::StagingFolder;
 
-const CELLS: &str = "cells.parquet";
+pub(super) const CELLS: &str = "cells.parquet";
+pub(super) const RESULTS_STEM: &str = "results";
+pub(super) const TIMINGS_STEM: &str = "timings";
 pub(super) const SHARES: &str = "shares";
-const VARIANTS: &str = "variants";
-const RUNS: &str = "runs";
+pub(super) const VARIANTS: &str = "variants";
+pub(super) const RUNS: &str = "runs";
 const SCENARIO: &str = "scenario.toml";
 /// Key of the fingerprint of all scenarios in the key-value pairs of a table.
 pub(super) const FINGERPRINT: &str = "sidestep.fingerprint";
-const TEMP_FOLDER: &str = "joining.partial";
+pub(super) const TEMP_FOLDER: &str = "joining.partial";
 
 /// The content of `sweep.json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -39,6 +46,9 @@ pub struct SweepManifest<P> {
     pub fingerprints: Vec<String>,
     /// The plan, in a format of the caller's.
     pub plan: P,
+    /// The table of the plan's trials and its digest; folders of older versions have none.
+    #[serde(default, skip_serializing_if = "FileList::is_empty")]
+    pub files: FileList,
 }
 
 /// The folder of a sweep, with a plan of type `P`.
@@ -46,6 +56,7 @@ pub struct SweepManifest<P> {
 pub struct SweepFolder<P> {
     path: PathBuf,
     manifest: SweepManifest<P>,
+    seal: Seal,
 }
 
 /// A folder that is deleted when this is dropped.
@@ -61,7 +72,11 @@ impl TempFolder {
 
 impl Drop for TempFolder {
     fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
+        // Its files were written by this process, which has removed most of them.
+        for file in list_tree(&self.0).unwrap_or_default() {
+            let _ = fs::remove_file(self.0.join(file));
+        }
+        let _ = fs::remove_dir(&self.0);
     }
 }
 
@@ -88,21 +103,25 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         check_vacant(path, crate::IfExists::Refuse)?;
         let staging = StagingFolder::new(path)?;
         let (plan, fingerprints, cells) = fill(staging.path())?;
+        make_folder(&staging.path().join(SHARES))?;
+        let cells: Vec<_> = cells.iter().collect();
+        let mut table =
+            run_table::stream(&staging.path().join(CELLS), &cells, program_version, &[])?;
+        let mut files = FileList::default();
+        files.insert(CELLS, table.close()?);
+        table.finish()?;
         let manifest = SweepManifest {
             format: format::CURRENT,
             program_version: program_version.into(),
             build: Some(build.into()),
             fingerprints,
             plan,
+            files,
         };
-        make_folder(&staging.path().join(SHARES))?;
-        let cells: Vec<_> = cells.iter().collect();
-        run_table::write(&staging.path().join(CELLS), &cells, program_version, &[])?;
-        let file = staging.path().join(MANIFEST);
-        disk::replace(&file, &json(&manifest, &file)?)?;
+        sealed_json::write_sealed(&staging.path().join(MANIFEST), &manifest)?;
         disk::sync_below(staging.path())?;
-        staging.commit()?;
-        Ok(Self { path: path.to_path_buf(), manifest })
+        staging.commit(&Replacement::default())?;
+        Ok(Self { path: path.to_path_buf(), manifest, seal: Seal::Confirmed })
     }
 
     /// Writes the scenario of a variant, and the files it names, into a folder that
@@ -141,8 +160,35 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             let remedy = "give the folder that a sweep was written to";
             return Err(InputError::new(path.display(), cause, remedy));
         }
-        let manifest = manifest::read_json(&path.join(MANIFEST))?;
-        Ok(Self { path: path.to_path_buf(), manifest })
+        let (manifest, seal) = sealed_json::read_sealed(&path.join(MANIFEST))?;
+        Ok(Self { path: path.to_path_buf(), manifest, seal })
+    }
+
+    /// Returns whether the manifest confirms its own content; that of older versions has no digest.
+    pub fn seal(&self) -> Seal {
+        self.seal
+    }
+
+    /// Checks a file against the digest in `STEM.manifest.json` beside it. Folders of older versions have no such list.
+    pub(super) fn check_listed(&self, file: &Path) -> Result<(), InputError> {
+        let (Some(name), Some(stem)) = (file.file_name(), file.file_stem()) else { return Ok(()) };
+        let stem =
+            if stem == TIMINGS_STEM { RESULTS_STEM } else { stem.to_str().unwrap_or_default() };
+        let list = file.with_file_name(FileManifest::name_for(stem));
+        if self.seal == Seal::Missing && !list.exists() {
+            return Ok(());
+        }
+        let (list, _) = FileManifest::read(&list)?;
+        let name = name.to_string_lossy();
+        if !list.files.contains(&name) {
+            let remedy = "the list of its files was changed: restore it";
+            return Err(InputError::new(
+                file.display(),
+                "no digest of this file is listed",
+                remedy,
+            ));
+        }
+        list.files.check_in(disk::parent(file), |listed| listed == name)
     }
 
     /// Returns the path of the folder, as it was given.
@@ -205,12 +251,29 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// An I/O error.
     pub fn temp_folder(&self) -> Result<TempFolder, RecordError> {
         let path = self.path.join(TEMP_FOLDER);
+        let failed = |e: std::io::Error| RecordError::new(path.display(), e);
         if path.exists() {
-            fs::remove_dir_all(&path).map_err(|e| RecordError::new(path.display(), e))?;
+            let remains = list_tree(&path).map_err(failed)?;
+            let other = remains.iter().find(|file| !is_bucket(file));
+            if let Some(other) = other {
+                let cause = "this file is in the way: move it elsewhere";
+                return Err(RecordError::new(path.join(other).display(), cause));
+            }
+            for file in remains {
+                fs::remove_file(path.join(file)).map_err(failed)?;
+            }
         }
         make_folder(&path)?;
         Ok(TempFolder(path))
     }
+}
+
+/// Returns whether a file has the name of a bucket of runs.
+fn is_bucket(file: &Path) -> bool {
+    let Some(name) = file.to_str().and_then(|name| name.strip_suffix(".jsonl")) else {
+        return false;
+    };
+    !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 /// Returns a digest of a scenario and the files it names, in hexadecimal; their order does not

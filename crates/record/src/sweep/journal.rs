@@ -1,9 +1,9 @@
 //! Finished runs, one line each, appended by one process.
 //!
 //! A line is the CRC-32 of a JSON text in hexadecimal, a space, the text, a newline. The first line
-//! records the version that wrote it. A line that a kill cut off has no newline, or a wrong
-//! checksum at the very end; it is deleted when the journal is opened to write. A wrong checksum
-//! elsewhere is damage, and an error.
+//! records the version that wrote it. A line that a kill cut off has no newline, or, after a power failure, a wrong
+//! checksum at the very end; it is deleted when the journal is opened to write, and its run is made again. A wrong
+//! checksum elsewhere is damage, and an error; for readers one at the end, too, because they would miss a run.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
@@ -69,7 +69,7 @@ impl Journal {
         let file = OpenOptions::new().read(true).append(true).create(true).open(path);
         let file = file.map_err(|e| unwritable(path, &e))?;
         lock(&file, path)?;
-        let length = read_complete_lines(path, of, each)?;
+        let length = read_complete_lines(path, of, Tail::Repaired, each)?;
         file.set_len(length).map_err(|e| unwritable(path, &e))?;
         let mut journal = Self { path: path.to_path_buf(), file, length, synced: Instant::now() };
         journal.file.seek(SeekFrom::End(0)).map_err(|e| unwritable(path, &e))?;
@@ -165,13 +165,23 @@ pub fn read_journal<T: DeserializeOwned>(
     of: SweepIdentity<'_>,
     each: impl FnMut(T),
 ) -> Result<(), InputError> {
-    read_complete_lines(path, of, each).map(drop)
+    read_complete_lines(path, of, Tail::Required, each).map(drop)
+}
+
+/// What becomes of a last line that is damaged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tail {
+    /// It is cut off, and its run is made again.
+    Repaired,
+    /// It is an error unless it is merely cut off.
+    Required,
 }
 
 /// Passes on the entries, and returns the number of bytes of complete lines.
 fn read_complete_lines<T: DeserializeOwned>(
     path: &Path,
     of: SweepIdentity<'_>,
+    tail: Tail,
     mut each: impl FnMut(T),
 ) -> Result<u64, InputError> {
     let file = File::open(path).map_err(|e| damaged(path, 1, e.to_string()))?;
@@ -186,6 +196,11 @@ fn read_complete_lines<T: DeserializeOwned>(
         let Some(json) = json(&bytes) else {
             // A kill leaves an incomplete line at the end and nowhere else.
             let is_last = reader.fill_buf().is_ok_and(<[u8]>::is_empty);
+            if is_last && tail == Tail::Required && is_changed_line(&bytes) {
+                let remedy = "`sidestep resume DIR` makes the run of this line again";
+                let cause = "the last line does not match its checksum";
+                return Err(InputError::new(path.display(), cause, remedy).with_position(number, 1));
+            }
             if is_last {
                 break;
             }
@@ -211,6 +226,12 @@ fn unwritable(path: &Path, error: &std::io::Error) -> InputError {
 fn damaged(path: &Path, line: usize, cause: String) -> InputError {
     let remedy = "the file is damaged: delete it, and its runs are made again";
     InputError::new(path.display(), cause, remedy).with_position(line, 1)
+}
+
+/// Returns whether a line that is not as it was written was once whole: cut off, it would have no newline.
+fn is_changed_line(line: &[u8]) -> bool {
+    let Some((_, text)) = line.split_last() else { return false };
+    line.ends_with(b"\n") || json(&[text, b"\n"].concat()).is_some()
 }
 
 /// Returns the text of a line if the line is complete.

@@ -5,7 +5,8 @@
 //! cells.parquet             one row per cell: number, variant, replicate, seed, parameters
 //! variants/0007/            the scenario of a variant, self-contained
 //! shares/1-of-4.journal     the finished runs of a share, while it is in progress
-//! shares/1-of-4.parquet     the same, once the share is done
+//! shares/1-of-4.parquet     the same, once the share is done; its digest is in 1-of-4.manifest.json
+//! results.manifest.json     the digests of the next two
 //! results.parquet           one row per run, of all shares: exists if and only if the sweep is done
 //! timings.parquet           the times that each run took
 //! joining.partial/          runs sorted into piles, while they are joined: if they are too many for the memory
@@ -16,6 +17,7 @@
 //! A killed process leaves at most an incomplete line, which the next one deletes. Only the owner
 //! of a share writes its journal; everything else is written once, and appears by a rename.
 
+mod check;
 mod folder;
 mod journal;
 mod results;

@@ -8,11 +8,12 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{ColumnWithRole, RecordError};
 use sidestep_kernel::shell::sidestep_command;
 
-use super::folder::{FINGERPRINT, SHARES, SweepFolder};
+use super::folder::{FINGERPRINT, RESULTS_STEM, SHARES, SweepFolder};
+use crate::file_manifest::FileManifest;
 use crate::run_table::{self, LoadedTable, TableStream};
 
-const RESULTS: &str = "results.parquet";
-const TIMINGS: &str = "timings.parquet";
+pub(super) const RESULTS: &str = "results.parquet";
+pub(super) const TIMINGS: &str = "timings.parquet";
 /// Key of the plan in the key-value pairs of a table.
 const PLAN: &str = "sidestep.plan";
 
@@ -20,6 +21,9 @@ const PLAN: &str = "sidestep.plan";
 pub struct ResultsWriter {
     results: TableStream,
     timings: TableStream,
+    /// The path of the list of both.
+    manifest: PathBuf,
+    program_version: String,
 }
 
 impl ResultsWriter {
@@ -36,11 +40,16 @@ impl ResultsWriter {
         self.timings.append(timings)
     }
 
-    /// Completes both. The table of timings comes first, because the sweep is done once the results exist.
+    /// Completes both. Their digests come first, because the sweep is done once the results exist, and the table of
+    /// timings before the results for the same reason.
     ///
     /// # Errors
     /// An I/O error.
-    pub fn finish(self) -> Result<(), RecordError> {
+    pub fn finish(mut self) -> Result<(), RecordError> {
+        let mut list = FileManifest::new("table", &self.program_version);
+        list.files.insert(TIMINGS, self.timings.close()?);
+        list.files.insert(RESULTS, self.results.close()?);
+        list.write(&self.manifest)?;
         self.timings.finish()?;
         self.results.finish()
     }
@@ -62,7 +71,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         let version = &self.manifest().program_version;
         let timings = TableStream::create(&self.path().join(TIMINGS), timings, version, &extra)?;
         let results = TableStream::create(&self.path().join(RESULTS), results, version, &extra)?;
-        Ok(ResultsWriter { timings, results })
+        let manifest = self.path().join(FileManifest::name_for(RESULTS_STEM));
+        Ok(ResultsWriter { timings, results, manifest, program_version: version.clone() })
     }
 
     /// Returns whether the table of all runs exists.
@@ -103,14 +113,17 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
 
     fn table<R: DeserializeOwned + Clone>(&self, name: &str) -> Result<LoadedTable<R>, InputError> {
         let path = self.path().join(name);
-        self.check_own(&path).and_then(|()| run_table::read(&path)).map_err(|e| {
-            // The results mark the sweep as done: without them everything is joined again.
-            let resume = sidestep_command("resume", self.path());
-            let remedy = format!(
-                "delete `{RESULTS}`; `{resume}` makes it again from the runs in `{SHARES}`"
-            );
-            InputError::new(e.place(), e.cause(), remedy)
-        })
+        self.check_listed(&path)
+            .and_then(|()| self.check_own(&path))
+            .and_then(|()| run_table::read(&path))
+            .map_err(|e| {
+                // The results mark the sweep as done: without them everything is joined again.
+                let resume = sidestep_command("resume", self.path());
+                let remedy = format!(
+                    "delete `{RESULTS}`; `{resume}` makes it again from the runs in `{SHARES}`"
+                );
+                InputError::new(e.place(), e.cause(), remedy)
+            })
     }
 
     /// Checks that a table is of this plan and these scenarios.

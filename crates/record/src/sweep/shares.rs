@@ -11,6 +11,7 @@ use sidestep_kernel::ports::{ColumnWithRole, RecordError};
 use super::folder::{FINGERPRINT, SHARES, SweepFolder};
 use super::journal::{Journal, SweepIdentity, is_locked, read_journal};
 use crate::disk;
+use crate::file_manifest::FileManifest;
 use crate::read::unreadable;
 use crate::run_table::{self, LoadedTable};
 
@@ -53,7 +54,12 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ) -> Result<(), RecordError> {
         let version = &self.manifest().program_version;
         let extra = [(FINGERPRINT, self.fingerprint())];
-        run_table::write(&self.share_file(share, "parquet"), runs, version, &extra)?;
+        let mut part =
+            run_table::stream(&self.share_file(share, "parquet"), runs, version, &extra)?;
+        let mut list = FileManifest::new("table", version);
+        list.files.insert(share_name(share, "parquet"), part.close()?);
+        list.write(&self.share_file(share, "manifest.json"))?;
+        part.finish()?;
         drop(journal);
         let path = self.share_file(share, "journal");
         fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
@@ -70,6 +76,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         for share in self.shares_with("parquet")? {
             let path = self.share_file(share, "parquet");
             self.check_part(&path)?;
+            self.check_listed(&path)?;
             let mut version = Ok(());
             run_table::read_blocks(&path, |block| {
                 version = self.check_version(&path, &block);
@@ -161,9 +168,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         Err(InputError::new(path.display(), cause, "delete it, and run this share again"))
     }
 
-    fn share_file(&self, share: Share, extension: &str) -> PathBuf {
-        let Share { index, count } = share;
-        self.path().join(SHARES).join(format!("{index}-of-{count}.{extension}"))
+    pub(super) fn share_file(&self, share: Share, extension: &str) -> PathBuf {
+        self.path().join(SHARES).join(share_name(share, extension))
     }
 
     /// Returns the shares that have a file with this extension, in order.
@@ -177,6 +183,10 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         shares.sort();
         Ok(shares)
     }
+}
+
+fn share_name(Share { index, count }: Share, extension: &str) -> String {
+    format!("{index}-of-{count}.{extension}")
 }
 
 fn share_of(name: &str, extension: &str) -> Option<Share> {

@@ -57,7 +57,7 @@ fn a_newer_format_is_refused_with_a_remedy() {
     let bytes = fs::read(&part).unwrap();
     let key = b"sidestep.format";
     let at = bytes.windows(key.len()).position(|w| w == key).unwrap() + key.len();
-    let version = at + bytes[at..].windows(3).position(|w| w == b"1.0").unwrap();
+    let version = at + bytes[at..].windows(3).position(|w| w == b"1.1").unwrap();
     let mut newer = bytes;
     newer[version] = b'2';
     fs::write(&part, newer).unwrap();

@@ -23,6 +23,7 @@ const ONE_RUN: &str = "**One run, n = 1**: these numbers have no interval, and s
 /// When it is no run folder, or something in it is damaged.
 pub(super) fn document(worlds: &Worlds, folder: &Path) -> Result<Document, InputError> {
     let view = RunReader::open(folder)?;
+    view.check_files(|_| true)?;
     let summary = read_summary(folder)?;
     let name = name(&view, summary.as_ref());
     let mut document = Document::new(format!("{name}, seed {}", view.manifest.seed), lead(&view));

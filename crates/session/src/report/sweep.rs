@@ -28,6 +28,8 @@ pub(super) fn document(
     watcher: &dyn Watcher,
 ) -> Result<Document, Error> {
     let FinishedRuns { table, is_complete } = read_finished(folder)?;
+    // Its text is shown.
+    folder.check_variant(0)?;
     let plan = folder.plan();
     let summary = plan.summary(worlds, &table)?;
     let mut document = Document::new(name(plan), lead(plan, &table));

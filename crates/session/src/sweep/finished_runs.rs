@@ -3,7 +3,7 @@
 use super::folder::{Folder, check_build, for_each_outcome, to_run_table};
 use super::trial_runner::RecordedTrial;
 use crate::watcher::NestedWatcher;
-use crate::{Error, Watcher};
+use crate::{Error, Watcher, picture};
 use sidestep_experiment::sweep::{RunTable, RunTableBuilder, Trial};
 use sidestep_kernel::InputError;
 use sidestep_kernel::shell::sidestep_command;
@@ -58,7 +58,11 @@ pub(crate) fn run_picture(
 ) -> Result<Result<String, String>, Error> {
     let recorded = folder.run_folder(trial.id);
     if let Some(svg) = stored_picture(&recorded) {
-        let made = RunReader::open(&recorded).ok().and_then(|view| view.manifest.digest);
+        let reader = RunReader::open(&recorded);
+        if let Ok(reader) = &reader {
+            reader.check_files(|name| name == picture::NAMES[0])?;
+        }
+        let made = reader.ok().and_then(|view| view.manifest.digest);
         if made.as_deref() == Some(digest) {
             return Ok(Ok(svg));
         }

@@ -129,7 +129,12 @@ fn a_table_of_runs_that_is_not_finished_and_a_place_to_join_them_leave_nothing()
     drop(completion);
     // A kill leaves its files there.
     std::mem::forget(folder.temp_folder().unwrap());
-    fs::write(folder.path().join(TEMP_FOLDER).join("old"), "rest").unwrap();
+    let joining = folder.path().join(TEMP_FOLDER);
+    fs::write(joining.join("0012.jsonl"), "rest").unwrap();
+    fs::write(joining.join("notes.txt"), "of the user").unwrap();
+    assert!(folder.temp_folder().unwrap_err().place.contains("notes.txt"));
+    assert_eq!(fs::read_dir(&joining).unwrap().count(), 2, "nothing is deleted");
+    fs::remove_file(joining.join("notes.txt")).unwrap();
     let scratch = folder.temp_folder().unwrap();
     assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
     drop(scratch);
