@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 
 use sidestep_kernel::InputError;
 
-use crate::file_list::hash_file;
-use crate::file_manifest::FileManifest;
-use crate::run_content::{RunContent, list_tree, slashed, unreadable};
+use crate::run_content::{RunContent, list_tree, unreadable};
 use crate::run_reader::RunReader;
 use crate::sealed_json::Seal;
 
@@ -54,40 +52,6 @@ impl Replacement {
                 obstacles.in_the_way.push(path);
             } else {
                 content.others.push(path);
-            }
-        }
-        obstacles.check(folder)?;
-        Ok(content)
-    }
-
-    /// Returns what may be deleted of a folder whose files are listed in `manifest`, a name in it; all others would lie
-    /// among files that other programs read as one, so they are in the way.
-    ///
-    /// # Errors
-    /// No such list; a file that was changed, or that is not in the list.
-    pub(crate) fn of_listed(folder: &Path, manifest: &str) -> Result<Self, InputError> {
-        let path = folder.join(manifest);
-        if !path.is_file() {
-            let cause = format!("it has no `{manifest}`, which says what was written to it");
-            return Err(InputError::new(
-                folder.display(),
-                cause,
-                "give a new folder, or remove it yourself",
-            ));
-        }
-        let (listed, _) = FileManifest::read(&path)?;
-        let mut content = Self::default();
-        let mut obstacles = Obstacles::default();
-        for path in list_tree(folder).map_err(|e| unreadable(folder, &e))? {
-            let name = slashed(&path);
-            let digest = listed.files.iter().find(|(listed, _)| *listed == name).map(|(_, d)| d);
-            match digest {
-                Some(digest) if hash_file(&folder.join(&path)).is_ok_and(|now| now == *digest) => {
-                    content.own.push(path);
-                }
-                Some(_) => obstacles.changed.push(path),
-                None if name == manifest => content.own.push(path),
-                None => obstacles.in_the_way.push(path),
             }
         }
         obstacles.check(folder)?;

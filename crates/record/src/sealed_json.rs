@@ -47,12 +47,15 @@ pub(crate) fn sealed_json(value: &impl Serialize) -> serde_json::Result<Vec<u8>>
     Ok(format!("{body}{}", ending(body)).into_bytes())
 }
 
-/// Returns the text of a manifest, which may have a digest that is no longer right, with the right one.
+/// Returns the text of a manifest, which may have a digest that is no longer right, with the right one; a text that is no
+/// JSON object as it is.
 pub fn seal_again(text: &str) -> String {
-    let text = text.trim_end();
-    let end = text.rfind(&format!(",\n  \"{KEY}\"")).or_else(|| text.rfind("\n}"));
-    let body = &text[..end.unwrap_or(text.len())];
-    format!("{body}{}", ending(body))
+    let sealed = serde_json::from_str(text).and_then(|mut values: serde_json::Map<_, _>| {
+        values.remove(KEY);
+        sealed_json(&values)
+    });
+    let sealed = sealed.ok().and_then(|bytes| String::from_utf8(bytes).ok());
+    sealed.unwrap_or_else(|| text.into())
 }
 
 /// Returns what follows the text before the digest.

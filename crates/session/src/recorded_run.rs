@@ -72,7 +72,7 @@ impl RecordedRun {
     }
 
     fn from_mcap(worlds: &Worlds, path: &Path) -> Result<Self, Error> {
-        let run = McapRunInfo::open(path)?;
+        let run = McapRunInfo::open(path).map_err(|e| explain_partial(path, e))?;
         let files =
             tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
         write_inputs(files.path(), &run.files)?;
@@ -217,6 +217,17 @@ impl RecordedRun {
             "the recording was changed, or this is a bug: please report it with the recording";
         Err(Error::other(format!("{}: {cause}", self.path.display()), remedy))
     }
+}
+
+/// Returns the error of a recording that was never ended with words for getting a whole one.
+fn explain_partial(path: &Path, error: InputError) -> InputError {
+    if path.extension() != Some("partial".as_ref()) {
+        return error;
+    }
+    let cause = "this is an MCAP file that is still being written, or whose process was killed: its end is missing";
+    let remedy = "if its run has a folder, `sidestep resume DIR` and then `sidestep export DIR --to mcap` make it whole; \
+                  else run the scenario again";
+    InputError::new(path.display(), cause, remedy)
 }
 
 /// Returns the files of a folder of inputs, by their names relative to the scenario; none without such a folder.

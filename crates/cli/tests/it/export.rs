@@ -54,7 +54,7 @@ fn another_digest_than_the_recorded_one_fails() {
     let manifest = place.read("r/run.json");
     let changed = manifest.replace("\"digest\": \"", "\"digest\": \"00");
     assert_ne!(manifest, changed);
-    place.write("r/run.json", changed);
+    place.write("r/run.json", sidestep_record::seal_again(&changed));
     let replayed = place.run(&["replay", "r"]);
     assert_eq!((replayed.code(), replayed.out().as_str()), (1, ""), "{}", replayed.err());
     assert!(replayed.err().contains("recorded is 00"), "{}", replayed.err());

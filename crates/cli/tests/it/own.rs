@@ -85,7 +85,7 @@ fn own_methods_drivers_and_reactions_are_checked_run_resumed_swept_and_replayed(
         assert_done(&place, &["replay", name, "--workers", "2"]);
         let manifest = place.read(&format!("{name}/run.json"));
         let interrupted = manifest.replace("\"complete\"", "\"incomplete\"");
-        place.write(&format!("{name}/run.json"), interrupted);
+        place.write(&format!("{name}/run.json"), sidestep_record::seal_again(&interrupted));
         assert_eq!(self::digest(&place, &["resume", name, "--workers", "2"]), digest);
         let swept = ["sweep", &scenario, "--vary", vary, "--replicate", "2", "--out", &sweep];
         assert_done(&place, &swept);
@@ -107,7 +107,7 @@ fn another_program_neither_knows_the_behavior_nor_continues_its_runs() {
     let stopped = own(&place, &["run", "s.toml", "--out", "r", "--cycles", "200"]);
     assert_eq!(stopped.code(), 0, "{}", stopped.err());
     let manifest = place.read("r/run.json").replace("\"complete\"", "\"incomplete\"");
-    place.write("r/run.json", manifest);
+    place.write("r/run.json", sidestep_record::seal_again(&manifest));
     let ended = place.run(&["resume", "r"]);
     assert!(ended.code() == 2 && ended.err().contains(".own-"), "{}", ended.err());
 }

@@ -154,7 +154,8 @@ fn a_run_that_was_stopped_is_marked_and_says_how_to_go_on() {
     let place = TestFolder::new();
     place.json(&["run", "s.toml", "--out", "r"]);
     let whole = place.read("r/run.json");
-    place.write("r/run.json", whole.replace("\"complete\"", "\"running\""));
+    let running = whole.replace("\"complete\"", "\"running\"");
+    place.write("r/run.json", sidestep_record::seal_again(&running));
     place.json(&["report", "r", "--out", "page.html"]);
     let text = place.read("page.md");
     assert!(text.contains("> **This run is not complete.**"), "{text}");

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{RecordError, Recorder};
-use sidestep_record::{Table, read_table};
+use sidestep_record::verify::verify;
+use sidestep_record::{IfExists, RunFolder, RunReader, Table, read_table};
 
-use crate::support::{recorder, rows};
+use crate::support::{new_run, recorder, rows, trajectories};
 
 /// A finished table and its only part.
 fn finished(folder: &Path) -> PathBuf {
@@ -91,4 +92,91 @@ fn a_full_disk_is_an_error_that_names_the_file_and_lasts() {
     check(recorder.append(0, &rows(10, 20)).unwrap_err());
     check(recorder.finish().unwrap_err());
     assert!(!folder.path().join("trajectories").exists());
+}
+
+/// A complete run with every kind of file, in `path`.
+fn complete_run(path: &Path) {
+    let inputs = [("inputs/map.txt".to_string(), b"a map".to_vec())];
+    let mut folder =
+        RunFolder::create_with_files(path, &new_run(), &inputs, IfExists::Replace).unwrap();
+    let mut recorder = folder.recorder(&[trajectories()], 0).unwrap();
+    recorder.append(0, &rows(0, 50)).unwrap();
+    recorder.make_durable(50).unwrap();
+    folder.save_checkpoint(50, b"state").unwrap();
+    recorder.append(0, &rows(50, 100)).unwrap();
+    recorder.finish().unwrap();
+    fs::write(path.join("trajectories.svg"), "<svg/>").unwrap();
+    folder.write_summary(&std::collections::BTreeMap::from([("cycles", 900)])).unwrap();
+    folder.add_file("trajectories.svg").unwrap();
+    folder.complete(100, "abcd").unwrap();
+}
+
+/// The files of a run that hold anything.
+const FILES: [&str; 8] = [
+    "run.json",
+    "scenario.toml",
+    "summary.json",
+    "checkpoint.bin",
+    "trajectories.svg",
+    "inputs/map.txt",
+    "trajectories/part-000000000000000.parquet",
+    "trajectories/part-000000000000050.parquet",
+];
+
+#[test]
+fn a_flipped_bit_in_any_file_of_a_run_is_noticed_and_named() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("run");
+    complete_run(&path);
+    assert_eq!(verify(&path).unwrap().sound, FILES.len());
+    for name in FILES {
+        let file = path.join(name);
+        let whole = fs::read(&file).unwrap();
+        for k in 0..40 {
+            let mut flipped = whole.clone();
+            flipped[k * whole.len() / 40] ^= 1 << (k % 8);
+            fs::write(&file, flipped).unwrap();
+            let found = verify(&path).unwrap().damaged;
+            let found: Vec<_> = found.into_iter().map(|damaged| damaged.path).collect();
+            assert_eq!(found, [file.as_path()], "flip {k}");
+            let read = RunReader::open(&path).and_then(|run| run.check_files(|_| true));
+            assert!(read.is_err(), "{name}, flip {k}");
+        }
+        fs::remove_file(&file).unwrap();
+        assert!(verify(&path).map_or(true, |result| !result.is_sound()), "{name} is missing");
+        fs::write(&file, whole).unwrap();
+    }
+    assert!(verify(&path).unwrap().is_sound());
+}
+
+#[test]
+fn only_files_that_the_manifest_names_are_replaced() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("run");
+    complete_run(&path);
+    fs::create_dir(path.join("plots")).unwrap();
+    for name in ["notes.txt", "thesis.toml", "report.html", "plots/a.png"] {
+        fs::write(path.join(name), name).unwrap();
+    }
+    assert_eq!(verify(&path).unwrap().others.len(), 4, "told, and no damage");
+    let refusal = || {
+        let created = RunFolder::create(&path, &new_run(), IfExists::Replace);
+        created.unwrap_err().to_string()
+    };
+    let mine = path.join("trajectories/mine.csv");
+    fs::write(&mine, "1,2").unwrap();
+    assert!(refusal().contains("in the way: trajectories/mine.csv"), "{}", refusal());
+    fs::remove_file(&mine).unwrap();
+    let scenario = fs::read(path.join("scenario.toml")).unwrap();
+    fs::write(path.join("scenario.toml"), "edited").unwrap();
+    assert!(refusal().contains("changed since they were written: scenario.toml"), "{}", refusal());
+    fs::write(path.join("scenario.toml"), scenario).unwrap();
+    complete_run(&path);
+    for name in ["notes.txt", "thesis.toml", "report.html", "plots/a.png"] {
+        assert_eq!(fs::read(path.join(name)).unwrap(), name.as_bytes());
+    }
+    assert!(verify(&path).unwrap().is_sound());
+    assert_eq!(crate::support::names(place.path()), ["run"], "nothing is left beside it");
+    fs::write(path.join("run.json"), "{\"name\": \"of another program\"}").unwrap();
+    assert!(refusal().contains("no manifest"), "{}", refusal());
 }

@@ -69,7 +69,8 @@ fn a_plan_that_does_not_fit_together_is_refused_by_all_who_read_it() {
     ] {
         let mut changed = whole.clone();
         changed["plan"][key] = value;
-        std::fs::write(&file, changed.to_string()).expect("written");
+        let text = sidestep_record::seal_again(&changed.to_string());
+        std::fs::write(&file, text).expect("written");
         refused_by_all(&path, cause);
     }
 }

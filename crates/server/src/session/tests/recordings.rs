@@ -27,7 +27,8 @@ fn made_by_another(folder: &tempfile::TempDir) {
     let text = std::fs::read_to_string(&manifest).expect("a manifest");
     let mut value: Value = serde_json::from_str(&text).expect("JSON");
     (value["program_version"], value["build"]) = ("0.0.9".into(), "0.0.9+abc".into());
-    std::fs::write(manifest, value.to_string()).expect("written");
+    let text = sidestep_record::seal_again(&value.to_string());
+    std::fs::write(manifest, text).expect("written");
 }
 
 fn opened(folder: tempfile::TempDir) -> (Page, Value) {
