@@ -113,8 +113,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
 
     fn table<R: DeserializeOwned + Clone>(&self, name: &str) -> Result<LoadedTable<R>, InputError> {
         let path = self.path().join(name);
-        self.check_listed(&path)
-            .and_then(|()| self.check_own(&path))
+        self.check_own(&path)
+            .and_then(|()| self.check_listed(&path))
             .and_then(|()| run_table::read(&path))
             .map_err(|e| {
                 // The results mark the sweep as done: without them everything is joined again.
