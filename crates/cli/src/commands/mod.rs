@@ -82,7 +82,7 @@ pub(crate) enum Command {
     Reproduce(reproduce::ReproduceArgs),
     /// Compute a recorded run again and compare it with the recording
     Replay(replay::ReplayArgs),
-    /// Check that every file of a run, a sweep or a report is as it was written
+    /// Check that every file of a recording is as it was written
     Verify(verify::VerifyArgs),
     /// Export a recorded run: tables, pictures, animations, recordings
     Export(export::ExportArgs),

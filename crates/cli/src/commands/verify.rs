@@ -20,7 +20,7 @@ Compares every file with the digest that was written of it: of runs, sweeps with
 exports. Files of others in a folder are listed, and are no error. The exit code is 2 if a file is damaged, was \
 changed, or is missing.";
 
-/// Check that every file of a run, a sweep or a report is as it was written.
+/// Check that every file of a recording is as it was written.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct VerifyArgs {

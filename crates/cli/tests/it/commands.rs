@@ -88,9 +88,15 @@ fn a_replay_of_changed_rows_says_so() {
     place.json(&["run", "s.toml", "--out", "other", "--seed", "6"]);
     std::fs::remove_dir_all(place.path("r/trajectories")).expect("removed");
     std::fs::rename(place.path("other/trajectories"), place.path("r/trajectories")).expect("moved");
-    let ended = place.run(&["replay", "r", "--cycle", "500"]);
-    assert_eq!(ended.code(), 1, "{}", ended.err());
-    assert!(ended.err().contains("differ"), "{}", ended.err());
+    let damaged = place.run(&["replay", "r"]);
+    assert_eq!(damaged.code(), 2, "{}", damaged.err());
+    assert!(damaged.err().contains("does not match its digest"), "{}", damaged.err());
+    crate::support::list_other_rows(&place, "r", "other");
+    for cycle in [&["--cycle", "500"][..], &[]] {
+        let ended = place.run(&[&["replay", "r"], cycle].concat());
+        assert_eq!(ended.code(), 1, "{}", ended.err());
+        assert!(ended.err().contains("differ"), "{}", ended.err());
+    }
 }
 
 #[test]

@@ -151,7 +151,11 @@ fn what_cannot_be_resumed_is_refused_with_the_reason() {
     other.write("r/checkpoint.bin", &bytes);
     let ended = other.run(&["resume", "r"]);
     assert_eq!(ended.code(), 2);
-    assert!(ended.err().contains("checksum") && ended.err().contains("help:"), "{}", ended.err());
+    assert!(
+        ended.err().contains("does not match its digest") && ended.err().contains("help:"),
+        "{}",
+        ended.err()
+    );
 }
 
 #[test]

@@ -185,3 +185,17 @@ pub(crate) fn requires(what: &str, why: &str) {
     assert!(!required.split(',').any(|word| word.trim() == what), "{what} is required: {why}");
     sidestep_testing::skip(why);
 }
+
+/// Lists the trajectories of another run in the manifest of a run, as if it had recorded them.
+pub(crate) fn list_other_rows(place: &TestFolder, run: &str, other: &str) {
+    let read = |run: &str| -> serde_json::Value {
+        serde_json::from_str(&place.read(&format!("{run}/run.json"))).expect("JSON")
+    };
+    let mut manifest = read(run);
+    let of_other = read(other)["files"].as_object().expect("files").clone();
+    let files = manifest["files"].as_object_mut().expect("files");
+    files.retain(|name, _| !name.starts_with("trajectories/"));
+    files.extend(of_other.into_iter().filter(|(name, _)| name.starts_with("trajectories/")));
+    let text = sidestep_record::seal_again(&manifest.to_string());
+    place.write(&format!("{run}/run.json"), text);
+}
