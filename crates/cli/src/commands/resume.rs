@@ -61,6 +61,7 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
 
 /// Prints the results of a finished run: a user who resumes all runs need not know which had ended.
 fn print_finished(reader: &RunReader, console: Console) -> Result<ExitCode, Failure> {
+    reader.check_files(|_| true)?;
     let folder = reader.path.display();
     let cycles = group_thousands(reader.manifest.cycles_done);
     console.note(format!(
