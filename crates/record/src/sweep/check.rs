@@ -15,13 +15,16 @@ use crate::read::unreadable;
 use crate::run_reader::LOCK;
 use crate::run_table;
 
+/// Files or folders, each with the result of its check.
+type CheckedFiles = Vec<(PathBuf, Result<(), InputError>)>;
+
 impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Checks the plan's table, the scenarios, the shares and the results: each file or folder, and whether it is as it
     /// was written.
     ///
     /// # Errors
     /// When the folder cannot be listed.
-    pub(crate) fn check_all(&self) -> Result<Vec<(PathBuf, Result<(), InputError>)>, InputError> {
+    pub(crate) fn check_all(&self) -> Result<CheckedFiles, InputError> {
         let mut all = vec![(self.path().join(CELLS), self.check_trials())];
         for variant in 0..self.manifest().fingerprints.len() as u32 {
             let folder = disk::parent(&self.scenario(variant)).to_path_buf();
@@ -47,10 +50,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         check_rows(&self.path().join(CELLS))
     }
 
-    fn check_shares(
-        &self,
-        all: &mut Vec<(PathBuf, Result<(), InputError>)>,
-    ) -> Result<(), InputError> {
+    fn check_shares(&self, all: &mut CheckedFiles) -> Result<(), InputError> {
         for (share, is_done) in self.shares()? {
             if is_done {
                 let list = self.share_file(share, "manifest.json");
