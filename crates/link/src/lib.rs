@@ -5,6 +5,7 @@
 //! peer.rs            participants of a fleet: the server, and a node for each agent
 //! protocol.rs        messages between peers, and the frames that carry them
 //! arq.rs             reliable delivery to one peer: numbered, acknowledged, retransmitted
+//! identity.rs        whom a certificate stands for
 //! messenger.rs       a peer's reliable and best-effort messages to and from all other peers
 //! agent.rs           the interface of an agent's program, of its percepts, controls and packets
 //! distributed.rs     the interface of a world whose agents are processes
@@ -24,6 +25,7 @@ mod chain;
 pub mod distributed;
 mod faults;
 pub mod hosted_run;
+pub mod identity;
 pub mod messenger;
 pub mod node;
 pub mod peer;

@@ -9,7 +9,7 @@ use sidestep::kernel::{Cycle, EntityId};
 pub use sidestep_session::fleet::{ClockMode, Topology};
 
 /// First bytes of every frame: `Sk`, and the version of the format.
-const MAGIC: [u8; 3] = [b'S', b'k', 2];
+const MAGIC: [u8; 3] = [b'S', b'k', 3];
 
 /// Maximum size of a frame, far above any percept: no node can make another one decode more than this.
 pub const MAX_FRAME_BYTES: usize = 64 << 20;
@@ -84,6 +84,8 @@ pub enum Message {
     End,
     /// Node to server: goodbye, nothing follows.
     Goodbye,
+    /// Node to server: it leaves before the fleet's end, with the reason. Best-effort from one that has had no answer.
+    Left(String),
 }
 
 /// A node that wants to join.

@@ -49,5 +49,8 @@ pub fn join(messenger: &mut Messenger, config: &JoinConfig) -> Result<Welcome, N
             }
         }
     }
+    // The server may have let it join, and its answers are lost.
+    let reason = "it has given up: no answer has arrived".to_string();
+    messenger.send_best_effort(PeerId::Server, Message::Left(reason));
     Err(NodeError::ServerSilent(config.timeout.as_secs()))
 }

@@ -3,20 +3,23 @@
 //!
 //! ```text
 //! join.rs         asks the server until it may join
+//! seat.rs         gives the seat back on every way out
 //! agent_cycle.rs  one cycle of the agent
 //! ```
 
 mod agent_cycle;
 mod join;
+mod seat;
 
 use crate::agent::{AgentActivity, AgentProgram, ChannelModel};
-use crate::messenger::{Messenger, ReceivedMessage};
+use crate::messenger::ReceivedMessage;
 use crate::protocol::{
     AgentPacket, ClockMode, CycleStart, FleetMember, JoinError, Message, NodeStatusReport, Welcome,
 };
 use crate::wire::{PeerId, WireSetupError};
 use agent_cycle::{AgentCycle, AgentCycleIo};
 pub use join::{JoinConfig, join};
+pub use seat::Seat;
 use sidestep::kernel::{Cycle, EntityId};
 use std::time::{Duration, Instant};
 
@@ -65,6 +68,9 @@ pub enum NodeError {
     /// The server has not heard it for too long, and has given it up.
     #[error("{}", .0.cause)]
     Dismissed(JoinError),
+    /// It was asked to end.
+    #[error("it was asked to end")]
+    Interrupted,
     /// A percept cannot be read.
     #[error("the server has sent a percept that cannot be read: {0}")]
     Percept(String),
@@ -73,10 +79,13 @@ pub enum NodeError {
 /// A listener for the status of a node, called whenever the status is sent to the server.
 type StatusListener = Box<dyn FnMut(&NodeStatusReport)>;
 
+/// A check whether a node is asked to end before its fleet does.
+type Interrupt = Box<dyn Fn() -> bool>;
+
 /// A node that has joined a fleet.
 pub struct Node {
     agent: EntityId,
-    messenger: Messenger,
+    messenger: Seat,
     program: Box<dyn AgentProgram>,
     /// The faults of the scenario's network; none where it has none.
     channel: Option<Box<dyn ChannelModel>>,
@@ -101,13 +110,15 @@ pub struct Node {
     /// Whether the links are closed because they could not be opened again.
     are_links_closed: bool,
     listener: StatusListener,
+    /// Whether the node is asked to end.
+    interrupt: Interrupt,
 }
 
 impl Node {
     /// Returns the node of an agent that may join, with its program and the faults of its packets.
     pub fn new(
         agent: EntityId,
-        messenger: Messenger,
+        messenger: Seat,
         program: Box<dyn AgentProgram>,
         channel: Option<Box<dyn ChannelModel>>,
         welcome: &Welcome,
@@ -131,6 +142,7 @@ impl Node {
             reopen_at: Instant::now(),
             are_links_closed: false,
             listener: Box::new(|_| {}),
+            interrupt: Box::new(|| false),
         }
     }
 
@@ -147,17 +159,43 @@ impl Node {
         Self { listener: Box::new(listener), ..self }
     }
 
-    /// Takes part in the fleet until the server ends it.
+    /// Makes the node leave the fleet as soon as a check says so.
+    #[must_use]
+    pub fn with_interrupt(self, interrupt: impl Fn() -> bool + 'static) -> Self {
+        Self { interrupt: Box::new(interrupt), ..self }
+    }
+
+    /// Takes part in the fleet until the server ends it. Where it ends before, the server is told.
     ///
     /// # Errors
-    /// When the server is silent, has given the node up, or sends a percept that cannot be read.
+    /// When the server is silent, has given the node up, or sends a percept that cannot be read, or the node is asked to
+    /// end.
     pub fn run(mut self) -> Result<NodeStatusReport, NodeError> {
+        let result = self.run_until_end();
+        match &result {
+            // The goodbye is said, or the server knows that the node is gone.
+            Ok(()) | Err(NodeError::Dismissed(_)) => self.messenger.mark_given_back(),
+            // Nobody acknowledges it; perhaps somebody hears it.
+            Err(error @ NodeError::ServerSilent(_)) => {
+                let left = Message::Left(error.to_string());
+                self.messenger.send_best_effort(PeerId::Server, left);
+                self.messenger.mark_given_back();
+            }
+            Err(error) => self.messenger.leave(&error.to_string()),
+        }
+        result.map(|()| self.status)
+    }
+
+    fn run_until_end(&mut self) -> Result<(), NodeError> {
         loop {
+            if (self.interrupt)() {
+                return Err(NodeError::Interrupted);
+            }
             let max_wait = self.cycle.as_ref().and_then(|cycle| cycle.max_wait(&*self.program));
             let wait = max_wait.map_or(POLL_INTERVAL, |wait| wait.min(POLL_INTERVAL));
             let Some(received) = self.receive_all(wait)? else {
                 self.leave();
-                return Ok(self.status);
+                return Ok(());
             };
             self.advance();
             self.report_status();

@@ -1,8 +1,19 @@
 //! Checks of certificates before anything starts: on a network a wrong one shows only as silence.
 
+use crate::identity::{CertificateName, common_name};
+use crate::wire::endpoint::{bare_host, host_and_port};
+use rustls::client::WebPkiServerVerifier;
+use rustls::client::danger::ServerCertVerifier;
+use rustls::crypto::CryptoProvider;
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
+use rustls::server::WebPkiClientVerifier;
+use rustls::sign::CertifiedKey;
+use rustls::{CertificateError, Error, InconsistentKeys, RootCertStore};
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::Tls;
 use std::path::Path;
+use std::sync::Arc;
 use x509_parser::pem::Pem;
 
 /// Checks certificates, and that endpoints are encrypted if and only if there are certificates.
@@ -17,7 +28,47 @@ pub(super) fn check_encryption<'a>(
     check_endpoint_encryption(endpoints, tls)
 }
 
-/// Checks that the files exist, and are certificates that are valid today.
+/// Checks that a party may be who it is to be by its certificate.
+///
+/// # Errors
+/// When the certificate is for somebody else.
+pub(super) fn check_identity(
+    tls: Option<&Tls>,
+    is_allowed: impl Fn(&CertificateName) -> bool,
+    wanted: &str,
+) -> Result<(), InputError> {
+    let Some(tls) = tls else { return Ok(()) };
+    let name = common_name(&tls.certificate).unwrap_or_default();
+    if CertificateName::parse(&name).is_some_and(|name| is_allowed(&name)) {
+        return Ok(());
+    }
+    let place = format!("--tls-cert {}", tls.certificate.display());
+    let cause = format!("it is for `{name}` (its common name), and this party is `{wanted}`");
+    let remedy = format!("give the certificate with the common name `{wanted}` (CN={wanted})");
+    Err(InputError::new(place, cause, remedy))
+}
+
+/// Checks that a node's certificate holds at the endpoints at which others reach it.
+///
+/// # Errors
+/// With the first endpoint for which it does not.
+pub(super) fn check_names(tls: Option<&Tls>, listen: &[String]) -> Result<(), InputError> {
+    let Some(tls) = tls else { return Ok(()) };
+    let Some(parts) = CertificateParts::read(tls) else { return Ok(()) };
+    for endpoint in listen {
+        let Ok((host, _)) = host_and_port(endpoint) else { continue };
+        if parts.verify_as_server(bare_host(host)).is_err_and(|error| is_other_name(&error)) {
+            let cert = tls.certificate.display();
+            let cause =
+                format!("the certificate {cert} is not for {host}, where others reach this party");
+            let remedy = format!("have it made with the subject alternative name {host}");
+            return Err(InputError::new(endpoint, cause, remedy));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the files exist, are certificates that are valid today, and fit each other.
 ///
 /// # Errors
 /// With the first that is not.
@@ -28,11 +79,115 @@ fn check_certificates(tls: &Tls) -> Result<(), InputError> {
     }
     let place = format!("--tls-key {}", tls.key.display());
     let key = read_tls_file(&place, &tls.key)?;
-    if !String::from_utf8_lossy(&key).contains("PRIVATE KEY-----") {
+    let text = String::from_utf8_lossy(&key);
+    if text.contains("ENCRYPTED") {
+        let remedy = "give the key without a password: openssl pkey -in KEY -out KEY.open";
+        return Err(InputError::new(place, "it is locked by a password", remedy));
+    }
+    if !text.contains("PRIVATE KEY-----") {
         let remedy = "give the file that begins with -----BEGIN PRIVATE KEY-----";
         return Err(InputError::new(place, "there is no private key in it", remedy));
     }
-    Ok(())
+    check_key(&place, tls)?;
+    check_authority(tls)
+}
+
+/// Checks that the private key can be used, and is that of the certificate.
+fn check_key(place: &str, tls: &Tls) -> Result<(), InputError> {
+    let unreadable = |cause: String| {
+        let remedy =
+            "give the private key that was made with the certificate (RSA, ECDSA or Ed25519)";
+        InputError::new(place, cause, remedy)
+    };
+    let key = PrivateKeyDer::from_pem_file(&tls.key)
+        .map_err(|e| unreadable(format!("its private key cannot be read: {e}")))?;
+    let key = provider()
+        .key_provider
+        .load_private_key(key)
+        .map_err(|_| unreadable("its private key is damaged, or of an unknown kind".into()))?;
+    let Some(parts) = CertificateParts::read(tls) else { return Ok(()) };
+    match CertifiedKey::new(parts.chain, key).keys_match() {
+        Err(Error::InconsistentKeys(InconsistentKeys::KeyMismatch)) => {
+            let certificate = tls.certificate.display();
+            Err(unreadable(format!("it is not the key of the certificate {certificate}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Checks that the certificate was signed by the authority, for links in both directions.
+fn check_authority(tls: &Tls) -> Result<(), InputError> {
+    let Some(parts) = CertificateParts::read(tls) else { return Ok(()) };
+    // Of the name only the endpoints know: any will do here.
+    let as_server = parts.verify_as_server("localhost");
+    let problems = [parts.verify_as_client().err(), as_server.err()];
+    let Some(problem) = problems.into_iter().flatten().find(|error| !is_other_name(error)) else {
+        return Ok(());
+    };
+    let authority = tls.authority.display();
+    let place = format!("--tls-cert {}", tls.certificate.display());
+    let cause = match problem {
+        Error::InvalidCertificate(CertificateError::UnknownIssuer) => {
+            format!("it was not signed by the authority in {authority}")
+        }
+        Error::InvalidCertificate(reason) => format!("it does not hold by {authority}: {reason}"),
+        other => format!("it does not hold by {authority}: {other}"),
+    };
+    let remedy = "give a certificate that this authority has signed, for servers and clients";
+    Err(InputError::new(place, cause, remedy))
+}
+
+/// Returns whether a certificate holds, and is for another name.
+fn is_other_name(error: &Error) -> bool {
+    matches!(
+        error,
+        Error::InvalidCertificate(
+            CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. }
+        )
+    )
+}
+
+/// Certificates of a party, read.
+struct CertificateParts {
+    chain: Vec<CertificateDer<'static>>,
+    roots: Arc<RootCertStore>,
+}
+
+impl CertificateParts {
+    /// Reads the certificates; `None` where [`check_certificates`] has said what is wrong.
+    fn read(tls: &Tls) -> Option<Self> {
+        let chain = read_chain(&tls.certificate)?;
+        let mut roots = RootCertStore::empty();
+        for certificate in read_chain(&tls.authority)? {
+            // One that is no root is of no use, and the certificate does not hold then.
+            let _ = roots.add(certificate);
+        }
+        Some(Self { chain, roots: Arc::new(roots) })
+    }
+
+    fn verify_as_client(&self) -> Result<(), Error> {
+        let builder = WebPkiClientVerifier::builder_with_provider(self.roots.clone(), provider());
+        let verifier = builder.build().map_err(|e| Error::General(e.to_string()))?;
+        verifier.verify_client_cert(&self.chain[0], &self.chain[1..], UnixTime::now()).map(drop)
+    }
+
+    fn verify_as_server(&self, host: &str) -> Result<(), Error> {
+        let name = ServerName::try_from(host).map_err(|e| Error::General(e.to_string()))?;
+        let builder = WebPkiServerVerifier::builder_with_provider(self.roots.clone(), provider());
+        let verifier = builder.build().map_err(|e| Error::General(e.to_string()))?;
+        let (end, between) = (&self.chain[0], &self.chain[1..]);
+        verifier.verify_server_cert(end, between, &name, &[], UnixTime::now()).map(drop)
+    }
+}
+
+/// Returns the certificates of a file; `None` if there is none that can be read.
+fn read_chain(file: &Path) -> Option<Vec<CertificateDer<'static>>> {
+    let chain: Vec<_> = CertificateDer::pem_file_iter(file).ok()?.collect::<Result<_, _>>().ok()?;
+    (!chain.is_empty()).then_some(chain)
+}
+
+fn provider() -> Arc<CryptoProvider> {
+    Arc::new(rustls::crypto::ring::default_provider())
 }
 
 /// Checks that all links are encrypted if there are certificates, and none is without.

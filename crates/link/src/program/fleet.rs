@@ -1,5 +1,6 @@
 //! A fleet: the server of a world as a process, with the nodes that it starts.
 
+use super::certificates::check_identity;
 use super::children::NodeProcesses;
 use super::metrics::{MetricsExporter, fleet_metrics};
 use super::node::endpoint_error;
@@ -10,6 +11,7 @@ use super::scenario::Scenario;
 use super::view::{self, ViewPublisher};
 use crate::distributed::DistributedWorld;
 use crate::hosted_run::HostedRun;
+use crate::identity::{CertificateName, SERVER_NAME};
 use crate::messenger::Messenger;
 use crate::protocol::{ClockMode, PacketRecord, Topology, Welcome};
 use crate::server::histogram::Histogram;
@@ -43,6 +45,8 @@ const MIN_JOIN_TIMEOUT_S: f64 = 30.0;
 /// # Errors
 /// When anything is wrong with the job, a node is lost in lockstep, or results cannot be stored.
 pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
+    let tls = job.common.tls.as_ref();
+    check_identity(tls, |name| *name == CertificateName::Server, SERVER_NAME)?;
     let scenario = Scenario::read(&job.common.flown)?;
     // Before the overrides: nodes are given the scenario without them, and must find the same fingerprint.
     let fingerprint = scenario.fingerprint()?;

@@ -3,6 +3,7 @@
 use crate::protocol::NodeStatusReport;
 use crate::server::histogram::Histogram;
 use crate::server::{FleetContext, ServerMetrics};
+use crate::wire::endpoint::parse_port;
 use crate::wire::http_text::serve_http_text;
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::{AgentName, FleetStatus, NodeStatus};
@@ -20,11 +21,15 @@ impl MetricsExporter {
     /// When the address cannot be bound.
     pub(super) fn serve_at(address: Option<&str>) -> Result<Self, InputError> {
         let Some(address) = address else { return Ok(Self::default()) };
-        let text = Arc::new(Mutex::new(String::new()));
-        serve_http_text(address, text.clone()).map_err(|e| {
+        let problem = |cause: String| {
             let remedy = "give --metrics HOST:PORT with a free port of this machine";
-            InputError::new(format!("--metrics {address}"), e.to_string(), remedy)
-        })?;
+            InputError::new(format!("--metrics {address}"), cause, remedy)
+        };
+        let (_, port) =
+            address.rsplit_once(':').ok_or_else(|| problem("the port is missing".into()))?;
+        parse_port(port).map_err(problem)?;
+        let text = Arc::new(Mutex::new(String::new()));
+        serve_http_text(address, text.clone()).map_err(|e| problem(e.to_string()))?;
         Ok(Self(Some(text)))
     }
 

@@ -27,6 +27,7 @@ mod scenario;
 mod view;
 mod watch;
 
+use crate::identity::{CertificateName, VIEWER_NAME};
 use output::print_message;
 use parent_monitor::ParentMonitor;
 use sidestep::kernel::terminal::escape_controls;
@@ -93,17 +94,21 @@ fn run_job(job: Job) -> Result<(), Error> {
     match job {
         Job::Fleet(job) => {
             apply_common_settings(&job.common, &job.listen)?;
-            fleet::run(&job, &ParentMonitor::watch_stdin())
+            fleet::run(&job, &ParentMonitor::watch())
         }
         Job::Node(job) => {
             apply_common_settings(&job.common, job.connect.iter().chain(&job.listen))?;
-            ParentMonitor::exit_with_parent();
-            node::run(&job)
+            node::run(&job, &ParentMonitor::watch_node())
         }
         Job::Watch(job) => {
             check_build(&job.build)?;
             certificates::check_encryption(&job.connect, job.tls.as_ref())?;
-            watch::watch_fleet(&job, &ParentMonitor::watch_stdin())
+            certificates::check_identity(
+                job.tls.as_ref(),
+                |name| matches!(name, CertificateName::Viewer | CertificateName::Server),
+                VIEWER_NAME,
+            )?;
+            watch::watch_fleet(&job, &ParentMonitor::watch())
         }
     }
 }

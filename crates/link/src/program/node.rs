@@ -1,12 +1,17 @@
 //! A node as a process.
 
+use super::certificates::{check_identity, check_names};
 use super::metrics::{MetricsExporter, node_metrics};
+use super::parent_monitor::ParentMonitor;
 use super::scenario::Scenario;
+use crate::identity::CertificateName;
 use crate::messenger::Messenger;
-use crate::node::{JoinConfig, Node, NodeError, join};
-use crate::protocol::{JoinError, JoinRequest, Topology};
+use crate::node::{JoinConfig, Node, NodeError, Seat, join};
+use crate::protocol::{JoinError, JoinRequest};
 use crate::wire::PeerId;
-use crate::wire::endpoint::{PortReservation, WireSetupError, reserve_port};
+use crate::wire::endpoint::{
+    PortReservation, WireSetupError, check_reachable, host_and_port, reserve_port,
+};
 use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::InputError;
 use sidestep::worlds::WORLDS;
@@ -18,9 +23,15 @@ use std::time::Duration;
 ///
 /// # Errors
 /// When anything is wrong with the job, or the server is gone.
-pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
+pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
+    job.connect.iter().try_for_each(|at| host_and_port(at).map(drop)).map_err(endpoint_error)?;
+    job.listen.iter().try_for_each(|at| check_reachable(at)).map_err(endpoint_error)?;
     let scenario = Scenario::read(&job.common.flown)?;
     let agent = scenario.world.find_agent_id(&job.agent)?;
+    let tls = job.common.tls.as_ref();
+    let wanted = CertificateName::Agent(job.agent.clone()).to_string();
+    check_identity(tls, |name| name.may_run(&job.agent), &wanted)?;
+    check_names(tls, &job.listen)?;
     let ports: Vec<PortReservation> = job
         .listen
         .iter()
@@ -44,21 +55,20 @@ pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
     let mut messenger = Messenger::new(PeerId::Node(agent), Box::new(wire));
     let welcome = join(&mut messenger, &JoinConfig { join: request, timeout })
         .map_err(|e| node_error(e, job))?;
-    // Only the server knows the topology.
-    if welcome.topology == Topology::Mesh && job.listen.is_empty() {
-        let cause = "in a mesh other nodes must reach this one";
-        let remedy =
-            "give it an address of this machine: --listen tcp/ADDRESS:PORT (port 0 for any)";
-        return Err(InputError::new("--listen", cause, remedy).into());
-    }
-    let scenario = scenario.with_overrides(&welcome.overrides)?;
+    monitor.record_seat();
+    let mut seat = Seat::new(messenger);
+    let scenario = scenario.with_overrides(&welcome.overrides).inspect_err(|error| {
+        seat.leave(&error.to_string());
+    })?;
     let program = scenario.world.program(agent, build);
     let channel = scenario.world.channel(agent);
     let name = job.agent.clone();
     tracing::info!(agent, who = format!("{} {name}", name.noun), "joined");
-    let node = Node::new(agent, messenger, program, channel, &welcome)
+    let interrupt = monitor.clone();
+    let node = Node::new(agent, seat, program, channel, &welcome)
         .with_server_timeout(Duration::from_secs_f64(job.common.lease_s))
-        .with_status_listener(move |status| exporter.replace_text(|| node_metrics(&name, status)));
+        .with_status_listener(move |status| exporter.replace_text(|| node_metrics(&name, status)))
+        .with_interrupt(move || interrupt.has_ended());
     node.run().map(drop).map_err(|e| node_error(e, job))
 }
 
@@ -66,12 +76,13 @@ pub(super) fn run(job: &NodeJob) -> Result<(), Error> {
 pub(super) fn endpoint_error(error: WireSetupError) -> Error {
     let cause = error.to_string();
     match error {
-        WireSetupError::NoEndpoint(endpoint) => {
+        WireSetupError::NoEndpoint { endpoint, .. } => {
             let remedy = "write it as tcp/HOST:PORT, or tls/HOST:PORT with certificates";
             InputError::new(endpoint, cause, remedy).into()
         }
         WireSetupError::Taken { endpoint, .. } => {
-            let remedy = "end what listens there, or give another port; 0 stands for any free one";
+            let remedy =
+                "give an address of this machine and a free port; port 0 stands for any free one";
             InputError::new(endpoint, cause, remedy).into()
         }
         WireSetupError::Distrust { endpoint, .. } => {
@@ -94,6 +105,7 @@ fn node_error(error: NodeError, job: &NodeJob) -> Error {
             InputError::new(job.connect.join(", "), cause, remedy).into()
         }
         NodeError::Wire(error) => endpoint_error(error),
+        NodeError::Interrupted => Error::Interrupted,
         NodeError::Dismissed(JoinError { remedy, .. }) => Error::other(cause, remedy),
         NodeError::ServerSilent(_) => {
             Error::other(cause, "see whether the server runs, and start both again")

@@ -1,7 +1,7 @@
 //! Joining: nodes ask, until every agent has one and all have received a message from each other.
 
 use super::{FleetError, FleetServer, NodeEntry};
-use crate::protocol::{FleetMember, Incarnation, JoinError, JoinRequest, Message};
+use crate::protocol::{FleetMember, Incarnation, JoinError, JoinRequest, Message, Topology};
 use crate::wire::PeerId;
 use sidestep::kernel::EntityId;
 
@@ -83,6 +83,7 @@ impl FleetServer<'_> {
             return Err(JoinRefusal::new("unknown", cause, &self.run.world().agent_hint()));
         };
         self.check_build_and_scenario(join)?;
+        self.check_listens(join)?;
         self.check_agent_free(entry, incarnation, join)
     }
 
@@ -109,6 +110,17 @@ impl FleetServer<'_> {
                 cause,
                 "give the node the same file and the same --set, --seed and --cycles as the server",
             ));
+        }
+        Ok(())
+    }
+
+    /// Refuses a node of a mesh that others cannot reach.
+    fn check_listens(&self, join: &JoinRequest) -> Result<(), JoinRefusal> {
+        if self.config.welcome.topology == Topology::Mesh && join.listens.is_empty() {
+            let cause = "in a mesh other nodes must reach this one, and it listens nowhere".into();
+            let remedy = "give it an address of its machine: --listen tcp/ADDRESS:PORT (tls/ with \
+                 certificates; port 0 for any)";
+            return Err(JoinRefusal::new("listens", cause, remedy));
         }
         Ok(())
     }

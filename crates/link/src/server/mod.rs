@@ -164,6 +164,8 @@ pub struct FleetServer<'a> {
     advance_reports: Vec<(EntityId, AdvanceDone)>,
     /// Records of packets that nodes have sent, where all are recorded.
     packets: Vec<(EntityId, PacketRecord)>,
+    /// Nodes that have left since the last poll, with the reasons.
+    departures: Vec<(EntityId, String)>,
 }
 
 impl<'a> FleetServer<'a> {
@@ -189,6 +191,7 @@ impl<'a> FleetServer<'a> {
             poll_at: now,
             advance_reports: Vec::new(),
             packets: Vec::new(),
+            departures: Vec::new(),
         }
     }
 
@@ -296,7 +299,10 @@ impl<'a> FleetServer<'a> {
         }
         self.publish_frame();
         let (hooks, view) = self.hooks_and_context();
-        let lost = hooks.on_poll(&view)?;
+        // Before the ends of processes: what a node says itself is the better reason.
+        let ended = hooks.on_poll(&view)?;
+        let mut lost = std::mem::take(&mut self.departures);
+        lost.extend(ended);
         for (agent, reason) in lost {
             self.mark_lost(agent, reason)?;
         }
@@ -350,6 +356,10 @@ impl<'a> FleetServer<'a> {
                 self.packets.extend(records.into_iter().map(|record| (agent, record)));
             }
             Message::Goodbye => node.has_left = true,
+            Message::Left(reason) => {
+                node.has_left = true;
+                self.departures.push((agent, reason));
+            }
             // A message that only servers send, or that nodes send to each other: of a faulty program.
             _ => {}
         }

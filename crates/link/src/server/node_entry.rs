@@ -46,6 +46,7 @@ impl NodeEntry {
         // A new process has received no `Hello` yet. One that only repeats its request stays as ready as it was.
         if is_new {
             self.joins += 1;
+            self.has_left = false;
             self.is_ready = false;
         }
         self.member = Some(member);

@@ -1,7 +1,7 @@
 //! Handshakes that only find out whether two peers accept each other's certificates: Zenoh keeps trying to connect, and
 //! reports no reason.
 
-use super::endpoint::host_and_port;
+use super::endpoint::{bare_host, host_and_port};
 use rustls::pki_types::pem::{self, PemObject};
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
 use rustls::{ClientConfig, ClientConnection, Error, RootCertStore, Stream};
@@ -18,7 +18,7 @@ const STEP_TIMEOUT: Duration = Duration::from_secs(1);
 /// Returns why one of the two ends rejects the other's certificate; none if neither does, or there is no answer.
 pub(super) fn certificate_problem(endpoint: &str, tls: &Tls) -> Option<String> {
     let (host, port) = host_and_port(endpoint).ok()?;
-    let bare = host.trim_start_matches('[').trim_end_matches(']');
+    let bare = bare_host(host);
     let address = (bare, port).to_socket_addrs().ok()?.next()?;
     let mut stream = TcpStream::connect_timeout(&address, STEP_TIMEOUT).ok()?;
     stream.set_read_timeout(Some(STEP_TIMEOUT)).ok()?;

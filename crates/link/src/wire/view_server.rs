@@ -3,7 +3,7 @@
 //! Nothing is pushed, and each viewer has at most one query in flight: so a viewer that is slow, or has stopped, gets fewer
 //! views and slows nobody. Views are made only while there are queries.
 
-use super::endpoint::WireSetupError;
+use super::endpoint::{WireSetupError, without_sources};
 use super::zenoh::{ZenohWire, open_query_session};
 use sidestep_session::fleet::Tls;
 use std::fmt;
@@ -121,7 +121,7 @@ impl ViewServer {
 }
 
 fn closed_wire_error(error: &zenoh::Error) -> WireSetupError {
-    WireSetupError::Taken { endpoint: VIEW_KEY.into(), reason: error.to_string() }
+    WireSetupError::Taken { endpoint: VIEW_KEY.into(), reason: without_sources(&error.to_string()) }
 }
 
 fn reply(query: &Query, text: String) {

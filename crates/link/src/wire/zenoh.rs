@@ -7,7 +7,8 @@
 mod echo;
 
 use super::endpoint::{
-    PortReservation, WireSetupError, check_vacant, endpoint_in_use, host_and_port,
+    PortReservation, WireSetupError, check_vacant, connection_problem, endpoint_in_use,
+    host_and_port, without_sources,
 };
 use super::{PeerId, Wire, handshake};
 use crate::protocol::FleetMember;
@@ -138,9 +139,11 @@ impl ZenohConfig<'_> {
         warn_of_linger();
         let mut config = Config::default();
         for (key, value) in self.json_entries() {
-            config.insert_json5(key, &value).map_err(|e| format!("{key} = {value}: {e}"))?;
+            config
+                .insert_json5(key, &value)
+                .map_err(|e| format!("{key} = {value}: {}", without_sources(&e.to_string())))?;
         }
-        zenoh::open(config).wait().map_err(|e| e.to_string())
+        zenoh::open(config).wait().map_err(|e| without_sources(&e.to_string()))
     }
 }
 
@@ -221,7 +224,7 @@ fn subscribe(
             let _ = frames.send(sample.payload().to_bytes().into_owned());
         }
     });
-    subscriber.wait().map_err(|e| e.to_string())
+    subscriber.wait().map_err(|e| without_sources(&e.to_string()))
 }
 
 impl ZenohLink {
@@ -308,8 +311,7 @@ impl ZenohWire {
         let config = client_config(connect, tls, within);
         Self::from_config(me, &config).map_err(|reason| {
             // At the first check the other end may not have listened yet.
-            let endpoint = connect.join(", ");
-            check_trust(connect, tls).err().unwrap_or(WireSetupError::NoAnswer { endpoint, reason })
+            check_trust(connect, tls).err().unwrap_or_else(|| no_answer(connect, reason))
         })
     }
 
@@ -399,9 +401,26 @@ pub(super) fn open_query_session(
     for endpoint in connect {
         host_and_port(endpoint)?;
     }
-    client_config(connect, tls, within)
-        .open()
-        .map_err(|reason| WireSetupError::NoAnswer { endpoint: connect.join(", "), reason })
+    client_config(connect, tls, within).open().map_err(|reason| no_answer(connect, reason))
+}
+
+/// Returns the error of endpoints that do not answer. Zenoh says of most that time has passed, and not why.
+fn no_answer(connect: &[String], said: String) -> WireSetupError {
+    let mut reasons = Vec::new();
+    for endpoint in connect {
+        let Some(reason) = connection_problem(endpoint) else { continue };
+        reasons.push(reason);
+    }
+    let reason = match () {
+        () if !reasons.is_empty() => reasons.join("; "),
+        () if said.contains("Timeout") => {
+            "what listens there is no server of a fleet, or asks for \
+                                           certificates that were not given"
+                .into()
+        }
+        () => said,
+    };
+    WireSetupError::NoAnswer { endpoint: connect.join(", "), reason }
 }
 
 impl Wire for ZenohWire {

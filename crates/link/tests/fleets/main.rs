@@ -1,5 +1,6 @@
 //! Fleets: in threads, over sockets, and as processes.
 
+mod admission;
 mod chains;
 mod clocks;
 mod cuts;

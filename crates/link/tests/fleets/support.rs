@@ -8,7 +8,7 @@ use sidestep_link::agent::{AgentActivity, AgentProgram, OutgoingPacket};
 use sidestep_link::distributed::DistributedWorld;
 use sidestep_link::hosted_run::HostedRun;
 use sidestep_link::messenger::Messenger;
-use sidestep_link::node::{JoinConfig, Node, NodeError, join};
+use sidestep_link::node::{JoinConfig, Node, NodeError, Seat, join};
 use sidestep_link::protocol::{ClockMode, JoinRequest, NodeStatusReport, Topology, Welcome};
 use sidestep_link::server::{
     FleetContext, FleetError, FleetServer, ServerConfig, ServerHooks, ServerMetrics,
@@ -233,6 +233,6 @@ fn run_node(
     let program = world.program(agent, "test");
     let program: Box<dyn AgentProgram> =
         if is_liar { Box::new(FaultyProgram(program)) } else { program };
-    let node = Node::new(agent, messenger, program, world.channel(agent), &welcome);
+    let node = Node::new(agent, Seat::new(messenger), program, world.channel(agent), &welcome);
     node.with_server_timeout(lease).run()
 }

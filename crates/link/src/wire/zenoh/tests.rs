@@ -399,9 +399,11 @@ fn a_port_that_is_taken_or_an_endpoint_that_is_none_is_said_to_be() {
     assert!(matches!(server, Err(WireSetupError::Taken { .. })));
     for wrong in ["127.0.0.1:7600", "udp/127.0.0.1:1", "tcp/127.0.0.1", "tcp/:1", "tcp/a:99999", ""]
     {
-        assert_eq!(
-            reserve_port(wrong).map(drop),
-            Err(WireSetupError::NoEndpoint(wrong.into())),
+        assert!(
+            matches!(
+                reserve_port(wrong),
+                Err(WireSetupError::NoEndpoint { endpoint, .. }) if endpoint == wrong
+            ),
             "{wrong}"
         );
     }
