@@ -30,6 +30,8 @@ mod drop_reason {
     pub(super) const FORMER_LIFE: &str = "former-life";
     /// The message is reliable, and the two peers have not connected.
     pub(super) const STRANGER: &str = "stranger";
+    /// Its sender is not who it says.
+    pub(super) const FORGED: &str = "forged";
     /// The message is a duplicate, or one before it is missing.
     pub(super) const OUT_OF_ORDER: &str = "out-of-order";
 }
@@ -231,6 +233,17 @@ impl Messenger {
         self.wire.send(&peers, &frame);
     }
 
+    /// Counts the frames whose sender is not who they say, and warns of them.
+    fn count_forged(&mut self) {
+        let forged = self.wire.take_forged();
+        if forged > 0 {
+            let count = self.stats.dropped.entry(drop_reason::FORGED).or_default();
+            *count += forged;
+            let (me, count) = (self.me, *count);
+            tracing::warn!(%me, count, "frames whose sender is not who they say are refused");
+        }
+    }
+
     fn count_drop(&mut self, reason: &'static str) {
         *self.stats.dropped.entry(reason).or_default() += 1;
     }
@@ -296,6 +309,7 @@ impl Messenger {
                 self.peers.values().filter_map(|state| state.link.next_send_time()).min();
             let wake_at = next_due.map_or(until, |due| due.min(until));
             let bytes = self.wire.receive(wake_at.saturating_sub(now));
+            self.count_forged();
             self.listened_at = self.now();
             self.excuse_absence(self.listened_at.saturating_sub(wake_at));
             if let Some(bytes) = bytes {

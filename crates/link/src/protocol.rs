@@ -265,6 +265,12 @@ impl<M: Serialize> TransportFrame<M> {
 }
 
 impl TransportFrame {
+    /// Returns the sender that a frame names, without reading the rest; `None` for another text.
+    pub fn sender(bytes: &[u8]) -> Option<PeerId> {
+        let body = bytes.strip_prefix(&MAGIC)?;
+        postcard::take_from_bytes(body).ok().map(|(sender, _)| sender)
+    }
+
     /// Reads a frame.
     ///
     /// # Errors

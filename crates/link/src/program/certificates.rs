@@ -1,6 +1,8 @@
 //! Checks of certificates before anything starts: on a network a wrong one shows only as silence.
 
+use crate::distributed::DistributedWorld;
 use crate::identity::{CertificateName, common_name};
+use crate::wire::access::Credentials;
 use crate::wire::endpoint::{bare_host, host_and_port};
 use rustls::client::WebPkiServerVerifier;
 use rustls::client::danger::ServerCertVerifier;
@@ -10,7 +12,7 @@ use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
 use rustls::server::WebPkiClientVerifier;
 use rustls::sign::CertifiedKey;
 use rustls::{CertificateError, Error, InconsistentKeys, RootCertStore};
-use sidestep::kernel::InputError;
+use sidestep::kernel::{EntityId, InputError};
 use sidestep_session::fleet::Tls;
 use std::path::Path;
 use std::sync::Arc;
@@ -46,6 +48,14 @@ pub(super) fn check_identity(
     let cause = format!("it is for `{name}` (its common name), and this party is `{wanted}`");
     let remedy = format!("give the certificate with the common name `{wanted}` (CN={wanted})");
     Err(InputError::new(place, cause, remedy))
+}
+
+/// Returns the certificates of a party, with the names in those of a world's agents.
+pub(super) fn credentials(tls: Option<&Tls>, world: &dyn DistributedWorld) -> Option<Credentials> {
+    let tls = tls?.clone();
+    let agents = 0..world.agent_count() as EntityId;
+    let names = agents.map(|agent| CertificateName::Agent(world.name(agent)).to_string());
+    Some(Credentials { tls, agents: names.collect() })
 }
 
 /// Checks that a node's certificate holds at the endpoints at which others reach it.

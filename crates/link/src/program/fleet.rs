@@ -1,7 +1,8 @@
 //! A fleet: the server of a world as a process, with the nodes that it starts.
 
-use super::certificates::check_identity;
+use super::certificates::{check_identity, credentials};
 use super::children::NodeProcesses;
+use super::log::report_denials;
 use super::metrics::{MetricsExporter, fleet_metrics};
 use super::node::endpoint_error;
 use super::output::print_message;
@@ -53,7 +54,8 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let overrides = scenario.required_overrides(job.clock, job.out.is_some());
     let scenario = scenario.with_overrides(&overrides)?;
     let listen = resolve_ports(&job.listen).map_err(endpoint_error)?;
-    let wire = ZenohWire::server_wire(&listen, job.common.tls.as_ref()).map_err(endpoint_error)?;
+    let credentials = credentials(tls, scenario.world.as_ref());
+    let wire = ZenohWire::server_wire(&listen, credentials.as_ref()).map_err(endpoint_error)?;
     let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
     let paths = OutputPaths { folder: job.out.as_deref(), mcap: None, replace: job.replace };
     // One worker, because the agents' decisions, which take most of the time, are made by the nodes.
@@ -341,6 +343,7 @@ impl ServerHooks for FleetSupervisor<'_> {
         }
         if Instant::now() >= self.report_at {
             self.report_at = Instant::now() + REPORT_INTERVAL;
+            report_denials();
             self.report(fleet);
         }
         let ended = self.children.poll_and_restart(|agent| {

@@ -1,5 +1,6 @@
 //! Logs to standard error, one line each, as text or as JSON.
 
+use crate::wire::access::{ACCESS_TARGET, DenialLayer, Denials, take_denials};
 use crate::wire::endpoint::without_sources;
 use sidestep::kernel::InputError;
 use std::io::{self, Write};
@@ -12,7 +13,7 @@ use tracing_subscriber::prelude::*;
 ///
 /// # Errors
 /// When there is no such level.
-pub(super) fn start(is_json: bool, level: &str) -> Result<(), InputError> {
+pub(super) fn start(is_json: bool, level: &str, is_encrypted: bool) -> Result<(), InputError> {
     let level_filter: LevelFilter = level.parse().map_err(|_| {
         let remedy = "give one of off, error, warn, info, debug and trace";
         InputError::new("--log", format!("there is no level `{level}`"), remedy)
@@ -26,7 +27,10 @@ pub(super) fn start(is_json: bool, level: &str) -> Result<(), InputError> {
             .with_target("zenoh_link_tls", level_filter.min(LevelFilter::WARN)),
     };
     let lines = fmt::layer().with_writer(|| CleanStderr).with_ansi(false).with_target(false);
-    let registry = tracing_subscriber::registry();
+    let denials = is_encrypted.then(|| {
+        DenialLayer.with_filter(Targets::new().with_target(ACCESS_TARGET, LevelFilter::TRACE))
+    });
+    let registry = tracing_subscriber::registry().with(denials);
     let started = if is_json {
         registry.with(lines.json().flatten_event(true).with_filter(targets)).try_init()
     } else {
@@ -35,6 +39,17 @@ pub(super) fn start(is_json: bool, level: &str) -> Result<(), InputError> {
     // It fails where a logger has been started, and this is called once.
     drop(started);
     Ok(())
+}
+
+/// Logs what access control has denied since the last call.
+pub(super) fn report_denials() {
+    if let Some(Denials { count, last }) = take_denials() {
+        tracing::warn!(
+            count,
+            last,
+            "messages are denied: a party does what its certificate does not allow"
+        );
+    }
 }
 
 /// What Zenoh advises whenever a link cannot be accepted, whatever the reason.

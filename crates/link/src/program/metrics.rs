@@ -3,6 +3,7 @@
 use crate::protocol::NodeStatusReport;
 use crate::server::histogram::Histogram;
 use crate::server::{FleetContext, ServerMetrics};
+use crate::wire::access::denied_total;
 use crate::wire::endpoint::parse_port;
 use crate::wire::http_text::serve_http_text;
 use sidestep::kernel::InputError;
@@ -92,6 +93,12 @@ pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetContext<'_>) -> S
     text.push_sample("frames_total", "", fleet.messenger.stats().frames);
     text.push_header("frame_bytes_total", "counter", "Bytes of frames that the server has sent.");
     text.push_sample("frame_bytes_total", "", fleet.messenger.stats().bytes);
+    text.push_header(
+        "denied_total",
+        "counter",
+        "Messages that a certificate does not allow, denied by the server.",
+    );
+    text.push_sample("denied_total", "", denied_total());
     push_node_metrics(&mut text, status, fleet);
     text.0
 }

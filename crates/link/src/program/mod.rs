@@ -118,7 +118,7 @@ fn apply_common_settings<'a>(
     common: &CommonSettings,
     endpoints: impl IntoIterator<Item = &'a String>,
 ) -> Result<(), Error> {
-    log::start(common.json_log, &common.log)?;
+    log::start(common.json_log, &common.log, common.tls.is_some())?;
     check_build(&common.flown.build)?;
     certificates::check_encryption(endpoints, common.tls.as_ref())?;
     Ok(())

@@ -1,6 +1,7 @@
 //! A node as a process.
 
-use super::certificates::{check_identity, check_names};
+use super::certificates::{check_identity, check_names, credentials};
+use super::log::report_denials;
 use super::metrics::{MetricsExporter, node_metrics};
 use super::parent_monitor::ParentMonitor;
 use super::scenario::Scenario;
@@ -48,8 +49,9 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
         listens: ports.iter().map(|port| port.endpoint.clone()).collect(),
         process: std::process::id(),
     };
+    let credentials = credentials(tls, scenario.world.as_ref());
     let wire =
-        ZenohWire::node_wire(PeerId::Node(agent), &job.connect, job.common.tls.as_ref(), timeout)
+        ZenohWire::node_wire(PeerId::Node(agent), &job.connect, credentials.as_ref(), timeout)
             .map_err(endpoint_error)?
             .with_listeners(ports);
     let mut messenger = Messenger::new(PeerId::Node(agent), Box::new(wire));
@@ -67,7 +69,10 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
     let interrupt = monitor.clone();
     let node = Node::new(agent, seat, program, channel, &welcome)
         .with_server_timeout(Duration::from_secs_f64(job.common.lease_s))
-        .with_status_listener(move |status| exporter.replace_text(|| node_metrics(&name, status)))
+        .with_status_listener(move |status| {
+            report_denials();
+            exporter.replace_text(|| node_metrics(&name, status));
+        })
         .with_interrupt(move || interrupt.has_ended());
     node.run().map(drop).map_err(|e| node_error(e, job))
 }

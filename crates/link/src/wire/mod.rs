@@ -5,12 +5,14 @@
 //! ```text
 //! zenoh.rs        between processes, with zenoh/echo.rs: probes of half-open links
 //! memory.rs       between threads
+//! access.rs       who may publish and subscribe what, by certificates
 //! endpoint.rs     notation of endpoints, and reserved ports
 //! handshake.rs    the reason why a certificate is rejected
 //! view_server.rs  views of a fleet for its viewers, by query and reply
 //! http_text.rs    a text served by HTTP
 //! ```
 
+pub mod access;
 pub mod endpoint;
 mod handshake;
 pub mod http_text;
@@ -31,6 +33,11 @@ pub trait Wire: Send {
 
     /// Returns the next frame that has arrived; waits for one at most the given time. `None` when none arrives.
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>>;
+
+    /// Takes the number of frames that were not received because their sender is not who they say.
+    fn take_forged(&mut self) -> u64 {
+        0
+    }
 
     /// Learns of all nodes of the fleet, and opens the direct links from this one to the others, where there are any.
     ///
@@ -61,6 +68,10 @@ pub trait Wire: Send {
 }
 
 impl<W: Wire + ?Sized> Wire for Box<W> {
+    fn take_forged(&mut self) -> u64 {
+        (**self).take_forged()
+    }
+
     fn send(&mut self, to: &[PeerId], frame: &[u8]) {
         (**self).send(to, frame);
     }

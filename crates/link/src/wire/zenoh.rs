@@ -6,19 +6,21 @@
 
 mod echo;
 
+use super::access::{ALL, Credentials, Guarded, access_control, frame_key, keys_to, sender_of};
 use super::endpoint::{
     PortReservation, WireSetupError, check_vacant, connection_problem, endpoint_in_use,
     host_and_port, without_sources,
 };
 use super::{PeerId, Wire, handshake};
-use crate::protocol::FleetMember;
+use crate::protocol::{FleetMember, TransportFrame};
 use echo::EchoProbes;
 use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::sync::Once;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Once};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use zenoh::key_expr::KeyExpr;
@@ -81,7 +83,8 @@ struct ZenohConfig<'a> {
     connect: &'a [String],
     /// Time that it waits for the first connection; none for a session that keeps trying.
     connected_within: Option<Duration>,
-    tls: Option<&'a Tls>,
+    /// Certificates, and the endpoint at which they control access.
+    guard: Option<(&'a Credentials, Guarded)>,
 }
 
 impl ZenohConfig<'_> {
@@ -117,7 +120,8 @@ impl ZenohConfig<'_> {
         if let Some(id) = &self.id {
             keys.push(("id", format!("{id:?}")));
         }
-        if let Some(tls) = self.tls {
+        if let Some((Credentials { tls, agents }, guarded)) = self.guard {
+            keys.push(("access_control", access_control(guarded, agents).to_string()));
             let authority = serde_json::json!(tls.authority).to_string();
             let certificate = serde_json::json!(tls.certificate).to_string();
             let key = serde_json::json!(tls.key).to_string();
@@ -152,7 +156,7 @@ pub struct ZenohWire {
     me: PeerId,
     /// Frames that have arrived, over any session.
     frames: Receiver<Vec<u8>>,
-    frame_sender: Sender<Vec<u8>>,
+    inbox: Inbox,
     /// The session with the server, or the server's own.
     hub: ZenohLink,
     /// The session with all other nodes, in a mesh.
@@ -161,7 +165,7 @@ pub struct ZenohWire {
     listens: Vec<String>,
     /// The ports of these endpoints, until the mesh is opened.
     ports: Vec<PortReservation>,
-    tls: Option<Tls>,
+    credentials: Option<Credentials>,
     /// All other nodes, in ascending order.
     other_nodes: Vec<PeerId>,
     /// The endpoints of the mesh to which this node opens links.
@@ -178,6 +182,7 @@ pub struct ZenohWire {
 
 /// A session, and the keys of the peers reached over it.
 struct ZenohLink {
+    me: PeerId,
     keys: BTreeMap<PeerId, KeyExpr<'static>>,
     _subscribers: Vec<Subscriber<()>>,
     session: Session,
@@ -191,38 +196,45 @@ fn zenoh_id(member: &FleetMember) -> u128 {
     u128::from(member.agent) << 64 | u128::from(member.incarnation.0)
 }
 
-/// The key under which frames for most nodes are published. No peer has that name.
-const BROADCAST_KEY: &str = "sidestep/all";
-
 impl fmt::Debug for ZenohWire {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("ZenohWire").field("me", &self.me).finish_non_exhaustive()
     }
 }
 
-/// The key under which frames for a peer are published.
-fn peer_key(to: PeerId) -> String {
-    format!("sidestep/{to}")
+/// What the subscribers of a wire share.
+struct Inbox {
+    frames: Sender<Vec<u8>>,
+    /// Number of frames that were not received because their sender is not who they say.
+    forged: Arc<AtomicU64>,
 }
 
-/// Forwards the frames that are published under a key to the receiver of a wire; echo probes are answered on the spot.
+/// Forwards the frames that are published under a key to the receiver of a wire; echo probes are answered on the spot. A
+/// frame whose sender is another one than its key says is not forwarded: only the key is under access control.
 fn subscribe(
     session: &Session,
     key: &str,
     me: PeerId,
-    frames: &Sender<Vec<u8>>,
+    inbox: &Inbox,
     echoes: &EchoProbes,
 ) -> Result<Subscriber<()>, String> {
-    let frames = frames.clone();
+    let (frames, forged) = (inbox.frames.clone(), inbox.forged.clone());
     let is_echo = match me {
         PeerId::Node(agent) => Some(echoes.handler(agent, session.clone())),
         PeerId::Server => None,
     };
     let subscriber = session.declare_subscriber(key).callback(move |sample: Sample| {
-        if is_echo.as_ref().is_none_or(|is_echo| !is_echo(&sample)) {
-            // An error means that the wire was dropped.
-            let _ = frames.send(sample.payload().to_bytes().into_owned());
+        if is_echo.as_ref().is_some_and(|is_echo| is_echo(&sample)) {
+            return;
         }
+        let bytes = sample.payload().to_bytes().into_owned();
+        let said = TransportFrame::sender(&bytes);
+        if said.is_some() && said != sender_of(sample.key_expr().as_str()) {
+            forged.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
+        // An error means that the wire was dropped.
+        let _ = frames.send(bytes);
     });
     subscriber.wait().map_err(|e| without_sources(&e.to_string()))
 }
@@ -231,22 +243,20 @@ impl ZenohLink {
     fn new(
         session: Session,
         me: PeerId,
-        frames: &Sender<Vec<u8>>,
+        inbox: &Inbox,
         echoes: &EchoProbes,
     ) -> Result<Self, String> {
         let mut subscribers = Vec::new();
-        // Other sessions learn of the subscriptions in this order: so one that can reach this peer by its own key reaches it
-        // with broadcasts, too. Broadcasts are for nodes only.
-        if me != PeerId::Server {
-            subscribers.push(subscribe(&session, BROADCAST_KEY, me, frames, echoes)?);
+        for key in keys_to(me) {
+            subscribers.push(subscribe(&session, &key, me, inbox, echoes)?);
         }
-        subscribers.push(subscribe(&session, &peer_key(me), me, frames, echoes)?);
-        Ok(Self { keys: BTreeMap::new(), _subscribers: subscribers, session })
+        Ok(Self { me, keys: BTreeMap::new(), _subscribers: subscribers, session })
     }
 
     fn send(&mut self, to: PeerId, frame: &[u8]) {
+        let me = self.me;
         let key = self.keys.entry(to).or_insert_with(|| {
-            KeyExpr::try_from(peer_key(to)).expect("a path of letters and digits is a key")
+            KeyExpr::try_from(frame_key(me, to)).expect("a path of letters and digits is a key")
         });
         publish_to_key(&self.session, key, frame, None);
     }
@@ -266,7 +276,7 @@ impl ZenohLink {
 
     /// Sends a frame to all nodes that this session reaches, except itself.
     fn broadcast(&self, frame: &[u8]) {
-        let key = KeyExpr::try_from(BROADCAST_KEY).expect("a path of letters is a key");
+        let key = KeyExpr::try_from(frame_key(self.me, ALL)).expect("a path of letters is a key");
         publish_to_key(&self.session, &key, frame, None);
     }
 }
@@ -289,10 +299,14 @@ impl ZenohWire {
     ///
     /// # Errors
     /// When one of them cannot be bound.
-    pub fn server_wire(listen: &[String], tls: Option<&Tls>) -> Result<Self, WireSetupError> {
+    pub fn server_wire(
+        listen: &[String],
+        credentials: Option<&Credentials>,
+    ) -> Result<Self, WireSetupError> {
         // Zenoh's own error names no endpoint.
         listen.iter().try_for_each(|endpoint| check_vacant(endpoint))?;
-        let config = ZenohConfig { mode: "router", listen, tls, ..ZenohConfig::default() };
+        let guard = credentials.map(|own| (own, Guarded::Server));
+        let config = ZenohConfig { mode: "router", listen, guard, ..ZenohConfig::default() };
         Self::from_config(PeerId::Server, &config).map_err(|reason| endpoint_in_use(listen, reason))
     }
 
@@ -304,11 +318,16 @@ impl ZenohWire {
     pub fn node_wire(
         me: PeerId,
         connect: &[String],
-        tls: Option<&Tls>,
+        credentials: Option<&Credentials>,
         within: Duration,
     ) -> Result<Self, WireSetupError> {
+        let tls = credentials.map(|own| &own.tls);
         check_trust(connect, tls)?;
-        let config = client_config(connect, tls, within);
+        let guarded = match me {
+            PeerId::Node(agent) => Guarded::Node(agent),
+            PeerId::Server => Guarded::Server,
+        };
+        let config = client_config(connect, credentials.map(|own| (own, guarded)), within);
         Self::from_config(me, &config).map_err(|reason| {
             // At the first check the other end may not have listened yet.
             check_trust(connect, tls).err().unwrap_or_else(|| no_answer(connect, reason))
@@ -318,16 +337,17 @@ impl ZenohWire {
     fn from_config(me: PeerId, config: &ZenohConfig<'_>) -> Result<Self, String> {
         let (frame_sender, frames) = channel();
         let echoes = EchoProbes::default();
-        let hub = ZenohLink::new(config.open()?, me, &frame_sender, &echoes)?;
+        let inbox = Inbox { frames: frame_sender, forged: Arc::default() };
+        let hub = ZenohLink::new(config.open()?, me, &inbox, &echoes)?;
         Ok(Self {
             me,
             frames,
-            frame_sender,
+            inbox,
             hub,
             mesh: None,
             listens: Vec::new(),
             ports: Vec::new(),
-            tls: config.tls.cloned(),
+            credentials: config.guard.map(|(own, _)| own.clone()),
             other_nodes: Vec::new(),
             connect: Vec::new(),
             mesh_id: 0,
@@ -350,17 +370,21 @@ impl ZenohWire {
         // one with the same id.
         self.mesh_openings += 1;
         let id = u128::from(self.mesh_openings) << 96 | self.mesh_id;
+        let guarded = match self.me {
+            PeerId::Node(agent) => Some(Guarded::Mesh(agent)),
+            PeerId::Server => None,
+        };
         let config = ZenohConfig {
             id: Some(format!("{id:x}")),
             mode: "peer",
             listen: &self.listens,
             connect: &self.connect,
-            tls: self.tls.as_ref(),
+            guard: self.credentials.as_ref().zip(guarded),
             connected_within: None,
         };
         let link = config
             .open()
-            .and_then(|session| ZenohLink::new(session, self.me, &self.frame_sender, &self.echoes))
+            .and_then(|session| ZenohLink::new(session, self.me, &self.inbox, &self.echoes))
             .map_err(|reason| endpoint_in_use(&self.listens, reason))?;
         self.mesh = Some(link);
         Ok(())
@@ -377,13 +401,13 @@ impl ZenohWire {
 /// Returns the configuration of a client's session.
 fn client_config<'a>(
     connect: &'a [String],
-    tls: Option<&'a Tls>,
+    guard: Option<(&'a Credentials, Guarded)>,
     within: Duration,
 ) -> ZenohConfig<'a> {
     ZenohConfig {
         mode: "client",
         connect,
-        tls,
+        guard,
         connected_within: Some(within),
         ..ZenohConfig::default()
     }
@@ -401,7 +425,9 @@ pub(super) fn open_query_session(
     for endpoint in connect {
         host_and_port(endpoint)?;
     }
-    client_config(connect, tls, within).open().map_err(|reason| no_answer(connect, reason))
+    let credentials = tls.map(|tls| Credentials { tls: tls.clone(), agents: Vec::new() });
+    let guard = credentials.as_ref().map(|own| (own, Guarded::Viewer));
+    client_config(connect, guard, within).open().map_err(|reason| no_answer(connect, reason))
 }
 
 /// Returns the error of endpoints that do not answer. Zenoh says of most that time has passed, and not why.
@@ -431,12 +457,20 @@ impl Wire for ZenohWire {
         };
         // To more than half of the nodes one broadcast is cheaper than a frame for each, although some nodes receive it in
         // vain: with ten airplanes in a star it took the processor time of a packet from 153 to about 100 us.
-        let are_most = to.len() > 1 && 2 * to.len() > self.other_nodes.len();
+        // With certificates nobody reads what is not for it.
+        let are_most = match &self.credentials {
+            None => to.len() > 1 && 2 * to.len() > self.other_nodes.len(),
+            Some(_) => to.len() > 1 && to.len() >= self.other_nodes.len(),
+        };
         if are_most && to.iter().all(|peer| self.other_nodes.binary_search(peer).is_ok()) {
             link.broadcast(frame);
         } else {
             to.iter().for_each(|&peer| link.send(peer, frame));
         }
+    }
+
+    fn take_forged(&mut self) -> u64 {
+        self.inbox.forged.swap(0, Ordering::Relaxed)
     }
 
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {

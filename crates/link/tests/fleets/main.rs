@@ -1,6 +1,7 @@
 //! Fleets: in threads, over sockets, and as processes.
 
 mod admission;
+mod attack;
 mod chains;
 mod clocks;
 mod cuts;

@@ -2,6 +2,7 @@
 
 use crate::processes::{LinkProcess, folder, job};
 use crate::support::{run_in_one_process, superconflict, wide};
+use sidestep_link::wire::access::Credentials;
 use sidestep_link::wire::endpoint::reserve_port;
 use sidestep_link::wire::zenoh::{ONE_THREAD, ZenohWire};
 use sidestep_link::wire::{PeerId, WireSetupError};
@@ -67,7 +68,7 @@ fn start_node(folder: &Path, tls: Option<Tls>, connect: &[String]) -> LinkProces
 }
 
 /// Returns where a server listens.
-fn endpoints(server: &LinkProcess) -> Vec<String> {
+pub(crate) fn endpoints(server: &LinkProcess) -> Vec<String> {
     server.until("its endpoints", |message| match message {
         LinkMessage::Listens(endpoints) => Some(endpoints),
         LinkMessage::Failed(failed) => panic!("{failed:?}"),
@@ -180,7 +181,7 @@ fn a_process_with_certificates_has_one_thread_of_the_network_whoever_has_started
 }
 
 /// Does a test of this program in a process with one thread of the network; in that process it returns true.
-fn is_process_with_one_thread(test: &str) -> bool {
+pub(crate) fn is_process_with_one_thread(test: &str) -> bool {
     let (variable, one_thread) = ONE_THREAD;
     if std::env::var_os(variable).is_some_and(|own| own == one_thread) {
         return true;
@@ -204,9 +205,13 @@ fn a_certificate_that_is_out_of_date_is_refused_by_the_server_which_says_so() {
     let Some(ours) = authority(folder.path(), "ours", 2) else { return };
     let Some(old) = certificate(folder.path(), "ours", "airplane-0", -1) else { return };
     let at = [reserve_port("tls/127.0.0.1:0").expect("a free port").endpoint];
-    let _server = ZenohWire::server_wire(&at, Some(&ours)).expect("a server");
-    let node =
-        |tls: &Tls| ZenohWire::node_wire(PeerId::Node(0), &at, Some(tls), Duration::from_secs(30));
+    let credentials =
+        |tls: &Tls| Credentials { tls: tls.clone(), agents: vec!["airplane-0".into()] };
+    let _server = ZenohWire::server_wire(&at, Some(&credentials(&ours))).expect("a server");
+    let node = |tls: &Tls| {
+        let own = credentials(tls);
+        ZenohWire::node_wire(PeerId::Node(0), &at, Some(&own), Duration::from_secs(30))
+    };
     match node(&old).map(drop) {
         Err(WireSetupError::Distrust { endpoint, reason }) => {
             assert_eq!(endpoint, at[0]);

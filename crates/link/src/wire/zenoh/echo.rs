@@ -1,7 +1,7 @@
 //! Probes of the other end of a link. Its Zenoh session replies in a thread of its own, however busy its node is: a link
 //! without replies is half-open.
 
-use super::publish_to_key;
+use super::{PeerId, frame_key, publish_to_key};
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -93,7 +93,8 @@ impl EchoProbes {
 }
 
 fn send(session: &Session, me: EntityId, to: EntityId, mark: &'static [u8]) {
-    let key = KeyExpr::try_from(super::peer_key(super::PeerId::Node(to)));
+    let (from, to) = (PeerId::Node(me), PeerId::Node(to));
+    let key = KeyExpr::try_from(frame_key(from, to));
     let key = key.expect("a path of letters and digits is a key");
     publish_to_key(session, &key, &me.to_le_bytes(), Some(mark));
 }

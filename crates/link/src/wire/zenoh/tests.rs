@@ -33,7 +33,8 @@ fn link(
         .open()
         .expect("open");
     let (sender, frames) = channel();
-    (ZenohLink::new(session, me, &sender, &EchoProbes::default()).expect("a link"), frames)
+    let inbox = Inbox { frames: sender, forged: Arc::default() };
+    (ZenohLink::new(session, me, &inbox, &EchoProbes::default()).expect("a link"), frames)
 }
 
 /// Sends a frame again and again until it has come.
