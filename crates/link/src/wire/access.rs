@@ -10,6 +10,7 @@ use crate::peer::PeerId;
 use serde_json::{Value, json};
 use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
+use std::cell::RefCell;
 use std::fmt::{self, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -238,16 +239,71 @@ impl<S: Subscriber> Layer<S> for DenialLayer {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
         let mut message = MessageText::default();
         event.record(&mut message);
-        let text = &message.0;
-        // What an endpoint keeps back of its own, on the way out, is no act of another party. Sessions of Zenoh watch each
-        // other's liveliness by themselves, which no code of a fleet uses.
-        let is_act = text.contains("(ingress)") && !text.contains("Liveliness");
-        let is_denied = is_act && text.contains("is unauthorized to");
-        if is_denied || text.contains("did not match any") {
+        let is_denied = PREVIEW.with_borrow_mut(|preview| preview.is_denied_act(&message.0));
+        if is_denied || message.0.contains("did not match any") {
             let mut denials = denials();
             denials.count += 1;
             denials.last = message.0;
         }
+    }
+}
+
+thread_local! {
+    static PREVIEW: RefCell<Preview> = const { RefCell::new(Preview { last: None, text: String::new() }) };
+}
+
+/// What Zenoh asks itself of a key as soon as a party gives it a number, in this order: so it has the answers at hand. Its
+/// log has them in the same words as what a party does.
+const PREVIEWED: [&str; 9] = [
+    "to Query (ingress)",
+    "to Reply (ingress)",
+    "to Put (ingress)",
+    "to Delete (ingress)",
+    "to Declare/Undeclare Subscriber (ingress)",
+    "to Declare/Undeclare Queryable (ingress)",
+    "to Declare/Undeclare Liveliness Token (ingress)",
+    "to Liveliness Query (ingress)",
+    "to Declare Liveliness Subscriber (ingress)",
+];
+
+/// The course of these questions in a thread.
+#[derive(Debug, Default)]
+struct Preview {
+    /// The number of the last of them, plus 1; `None` where none are asked.
+    last: Option<usize>,
+    /// The line that answered it.
+    text: String,
+}
+
+impl Preview {
+    /// Returns whether a line of the log says that a party has done what it may not.
+    fn is_denied_act(&mut self, text: &str) -> bool {
+        // What an endpoint keeps back of its own, on the way out, is no act of another party.
+        if !text.contains("(ingress)") {
+            return false;
+        }
+        if text.contains("caching permissions") {
+            self.last = Some(0);
+            return false;
+        }
+        if !text.starts_with("Using cached result") && self.is_next(text) {
+            return false;
+        }
+        self.last = None;
+        // Sessions of Zenoh watch each other's liveliness by themselves, which no code of a fleet uses.
+        text.contains("is unauthorized to") && !text.contains("Liveliness")
+    }
+
+    /// Returns whether a line answers the next question. A party that has several names is asked for by each.
+    fn is_next(&mut self, text: &str) -> bool {
+        let Some(last) = self.last else { return false };
+        let Some(k) = PREVIEWED.iter().position(|asked| text.contains(asked)) else { return false };
+        let is_next = k + 1 > last || (k + 1 == last && self.text != text);
+        if is_next {
+            self.last = Some(k + 1);
+            self.text = text.into();
+        }
+        is_next
     }
 }
 
@@ -265,6 +321,28 @@ impl Visit for MessageText {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_zenoh_asks_itself_is_no_act_and_what_a_party_does_is() {
+        let mut preview = Preview::default();
+        assert!(preview.is_denied_act("1f on lo is unauthorized to Put (ingress) on sidestep/3/0"));
+        assert!(!preview.is_denied_act("ACL (ingress): caching permissions for `sidestep` ..."));
+        for asked in PREVIEWED {
+            let line = format!("1f on lo is unauthorized {asked} on sidestep");
+            assert!(!preview.is_denied_act(&line), "{line}");
+        }
+        for act in ["Put (ingress)", "Declare Subscriber (ingress)"] {
+            assert!(
+                preview.is_denied_act(&format!("1f on lo is unauthorized to {act} on a/b")),
+                "{act}"
+            );
+        }
+        assert!(
+            preview.is_denied_act("Using cached result: 1f is unauthorized to Put (ingress) on a")
+        );
+        assert!(!preview.is_denied_act("1f on lo is authorized to Put (ingress) on sidestep/1/0"));
+        assert!(!preview.is_denied_act("1f on lo is unauthorized to Query (egress) on sidestep"));
+    }
 
     #[test]
     fn the_key_of_a_frame_names_its_sender() {

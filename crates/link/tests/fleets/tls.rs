@@ -12,7 +12,7 @@ use sidestep_session::fleet::{
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 fn openssl(folder: &Path, words: &str) -> bool {
     let made = Command::new("openssl").args(words.split_whitespace()).current_dir(folder).output();
@@ -103,7 +103,11 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
     }
     // Zenoh's words, because it alone sees the certificate.
     let says = |line: &String| line.contains("UnknownCA");
-    assert!(server.logged().iter().any(says), "{:?}", server.logged());
+    let until = Instant::now() + Duration::from_secs(60);
+    while !server.logged().iter().any(says) {
+        assert!(Instant::now() < until, "{:?}", server.logged());
+        std::thread::sleep(Duration::from_millis(20));
+    }
     assert!(!server.logged().join(" ").contains("open file limit"), "{:?}", server.logged());
     let Some(own) = certificate(folder.path(), "ours", "airplane-1", 2) else { return };
     let last = node(Some(own));
