@@ -1,6 +1,6 @@
 //! The folder of one run: created in one step, written by one process, resumed after a stop.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -11,6 +11,7 @@ use crate::disk;
 use crate::file_list::{FileList, SharedFileList};
 use crate::manifest::{self, Manifest, Status, json};
 use crate::parquet::ParquetRecorder;
+use crate::process_lock::{LockError, ProcessLock, holder_text};
 use crate::replacement::Replacement;
 use crate::run_reader::{
     CHECKPOINT, LOCK, MANIFEST, RunReader, SCENARIO, SUMMARY, check_is_run, is_result, is_run, read,
@@ -59,8 +60,7 @@ pub struct RunFolder {
     scenario: String,
     /// The files that are written so far; the manifest gets them when it is written.
     files: SharedFileList,
-    /// Locked; the system releases the lock when the process ends in any way.
-    _lock: File,
+    _lock: ProcessLock,
 }
 
 impl RunFolder {
@@ -308,19 +308,18 @@ pub(crate) fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputE
     Err(InputError::new(path.display(), cause, "give a new or empty folder"))
 }
 
-fn lock(folder: &Path) -> Result<File, InputError> {
+fn lock(folder: &Path) -> Result<ProcessLock, InputError> {
     let path = folder.join(LOCK);
-    let file = read(&path, |p| OpenOptions::new().create(true).append(true).open(p))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => {
-            let cause = "another process is writing this run";
+    ProcessLock::acquire(&path).map_err(|error| match error {
+        LockError::Held(holder) => {
+            let cause = format!("{} is writing this run", holder_text(holder));
             let remedy = "wait until it ends, stop it, or give another folder";
-            Err(InputError::new(folder.display(), cause, remedy))
+            InputError::new(folder.display(), cause, remedy)
         }
-        Err(TryLockError::Error(e)) => {
-            let remedy = "put the run on a file system that can lock files";
-            Err(InputError::new(path.display(), e.to_string(), remedy))
+        LockError::System(e) => {
+            let remedy =
+                "make the folder writable, and put the run on a file system that can lock files";
+            InputError::new(path.display(), e.to_string(), remedy)
         }
-    }
+    })
 }

@@ -6,6 +6,7 @@ mod file_list;
 mod file_manifest;
 mod group;
 mod part;
+mod process_lock;
 mod replacement;
 mod run_content;
 mod run_reader;

@@ -5,7 +5,7 @@
 //! checksum at the very end; it is deleted when the journal is opened to write, and its run is made again. A wrong
 //! checksum elsewhere is damage, and an error; for readers one at the end, too, because they would miss a run.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -16,15 +16,11 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
 use crate::format::{self, FormatVersion};
+use crate::process_lock::{self, LockError, ProcessLock, holder_text};
 
 /// Largest age of lines that a power failure may lose: their cells are run again. A kill loses
 /// none.
 const SYNC_INTERVAL: Duration = Duration::from_millis(200);
-
-/// Number of further tries to lock a journal that is locked,
-const MAX_LOCK_RETRIES: usize = 5;
-/// and the time between two.
-const LOCK_RETRY_DELAY: Duration = Duration::from_millis(10);
 
 /// What a journal has to match: its runs may not go into the table of another sweep.
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +49,8 @@ pub struct Journal {
     /// Number of bytes of complete lines.
     length: u64,
     synced: Instant,
+    /// None where the file system has no locks.
+    lock: Option<ProcessLock>,
 }
 
 impl Journal {
@@ -66,12 +64,14 @@ impl Journal {
         of: SweepIdentity<'_>,
         each: impl FnMut(T),
     ) -> Result<Self, InputError> {
+        // The lock comes first: nothing of a journal that another process writes is touched.
+        let lock = lock(path)?;
         let file = OpenOptions::new().read(true).append(true).create(true).open(path);
         let file = file.map_err(|e| unwritable(path, &e))?;
-        lock(&file, path)?;
         let length = read_complete_lines(path, of, Tail::Repaired, each)?;
         file.set_len(length).map_err(|e| unwritable(path, &e))?;
-        let mut journal = Self { path: path.to_path_buf(), file, length, synced: Instant::now() };
+        let (path_buf, synced) = (path.to_path_buf(), Instant::now());
+        let mut journal = Self { path: path_buf, file, length, synced, lock };
         journal.file.seek(SeekFrom::End(0)).map_err(|e| unwritable(path, &e))?;
         if length == 0 {
             let header = JournalHeader {
@@ -103,6 +103,21 @@ impl Journal {
         if self.synced.elapsed() < SYNC_INTERVAL { Ok(()) } else { self.sync() }
     }
 
+    /// Deletes the journal, once its entries are stored elsewhere.
+    ///
+    /// # Errors
+    /// An I/O error; the journal may stay then.
+    pub fn delete(self) -> Result<(), RecordError> {
+        let Self { path, file, lock, .. } = self;
+        // Some systems do not delete open files.
+        drop(file);
+        let deleted = fs::remove_file(&path);
+        // Before the lock is released, so that it is not that of another process.
+        let _ = fs::remove_file(lock_path(&path));
+        drop(lock);
+        deleted.map_err(|e| RecordError::new(path.display(), e))
+    }
+
     /// Makes all entries durable against a power failure.
     ///
     /// # Errors
@@ -116,38 +131,29 @@ impl Journal {
 
 /// Returns whether a process writes the journal at `path`; none where the file system has no locks.
 pub(super) fn is_locked(path: &Path) -> Option<bool> {
-    match File::open(path) {
-        Err(_) => Some(false),
-        Ok(file) => match file.try_lock_shared() {
-            Ok(()) => Some(false),
-            Err(TryLockError::WouldBlock) => Some(true),
-            Err(TryLockError::Error(_)) => None,
-        },
-    }
+    process_lock::is_locked(&lock_path(path))
 }
 
-/// Locks a file against other writers. [`is_locked`] in another process holds a shared lock for a
-/// moment, so a lock that fails is tried again a few times.
-fn try_lock(file: &File) -> Result<(), TryLockError> {
-    for _ in 0..MAX_LOCK_RETRIES {
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => std::thread::sleep(LOCK_RETRY_DELAY),
-            other => return other,
-        }
-    }
-    file.try_lock()
+/// Returns the file that stands for the journal's lock: the journal itself is also opened to be read, and closing it
+/// would release the lock.
+fn lock_path(journal: &Path) -> PathBuf {
+    journal.with_extension("lock")
 }
 
-fn lock(file: &File, path: &Path) -> Result<(), InputError> {
-    let cause = match try_lock(file) {
-        Ok(()) => return Ok(()),
-        Err(TryLockError::WouldBlock) => "another process is running this share".to_string(),
+/// Locks a journal against other writers; none where the file system has no locks.
+fn lock(path: &Path) -> Result<Option<ProcessLock>, InputError> {
+    let cause = match ProcessLock::acquire(&lock_path(path)) {
+        Ok(lock) => return Ok(Some(lock)),
+        Err(LockError::Held(holder)) => format!("{} is running this share", holder_text(holder)),
         // Some network file systems have no locks: there, the user's scheduler must prevent two
         // writers.
-        Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => return Ok(()),
-        Err(TryLockError::Error(e)) => e.to_string(),
+        Err(LockError::System(e)) if e.kind() == std::io::ErrorKind::Unsupported => {
+            return Ok(None);
+        }
+        Err(LockError::System(e)) => return Err(unwritable(path, &e)),
     };
-    Err(InputError::new(path.display(), cause, "wait for it, or run another share"))
+    let remedy = "wait for it, end it, or run another share";
+    Err(InputError::new(path.display(), cause, remedy))
 }
 
 fn line(entry: &impl Serialize) -> serde_json::Result<String> {
@@ -323,7 +329,7 @@ mod tests {
         let path = folder.path().join("j");
         let journal = opened(&path);
         let error = refused(&path, OF);
-        assert!(error.cause().contains("another process"), "{error}");
+        assert!(error.cause().contains("this process itself is running"), "{error}");
         assert_eq!(is_locked(&path), Some(true));
         drop(journal);
         assert_eq!(is_locked(&path), Some(false), "also after a kill: the system takes locks away");

@@ -1,6 +1,5 @@
 //! Shares of a sweep: each has a journal while it runs, and a part of the table once it is done.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -60,9 +59,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         list.files.insert(share_name(share, "parquet"), part.close()?);
         list.write(&self.share_file(share, "manifest.json"))?;
         part.finish()?;
-        drop(journal);
-        let path = self.share_file(share, "journal");
-        fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))
+        journal.delete()
     }
 
     /// Passes on the parts of shares that are done, one by one, and those block by block.

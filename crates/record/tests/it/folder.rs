@@ -92,8 +92,8 @@ fn two_writers_of_one_folder_are_refused() {
     let path = parent.path().join("a");
     let folder = create(&path);
     let error = RunFolder::resume(&path).unwrap_err();
-    assert!(error.cause().contains("another process"), "{error}");
-    assert!(refusal(&path, IfExists::Replace).contains("another process"));
+    assert!(error.cause().contains("this process itself is writing"), "{error}");
+    assert!(refusal(&path, IfExists::Replace).contains("this process itself"));
     assert_eq!(names(parent.path()), ["a"]);
     drop(folder);
     assert!(RunFolder::resume(&path).is_ok());
