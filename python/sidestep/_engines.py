@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 from ._errors import EngineError, SidestepError, input_error
-from ._native import run_task
+from ._workers import driving, run_task
 
 #: Engines that run the trials of a sweep.
 Engine: TypeAlias = Literal["local", "ray"] | Executor | Callable[[], Executor]
@@ -100,6 +100,10 @@ class TaskPool:
 
     def run(self, build: str, trials: Sequence[Trial]) -> Steps:
         """Runs all trials; yields the numbers of variants whose scenarios it needs, and outcomes as they arrive."""
+        with driving():
+            yield from self._run(build, trials)
+
+    def _run(self, build: str, trials: Sequence[Trial]) -> Steps:
         tasks: list[_Task] = []
         waiting = deque(trials)
         retries: deque[_Task] = deque()

@@ -226,6 +226,123 @@ def test_a_killed_driver_loses_nothing_that_is_in_the_journal(floor, tmp_path):
     goes_on(floor, out)
 
 
+FORK = get_context("fork") if hasattr(os, "fork") else None
+forks = pytest.mark.skipif(FORK is None, reason="this system does not fork")
+
+FORKING_DRIVER = """
+import sys
+from concurrent.futures import ProcessPoolExecutor
+import sidestep, test_sweep
+floor, out = sys.argv[1:]
+sidestep.sweep(floor, **test_sweep.ENDLESS, out=out, engine=lambda: ProcessPoolExecutor(3, mp_context=test_sweep.FORK))
+"""
+#: The runs of the second variant would go on for days, so that a sweep is always stopped in the middle of a task.
+ENDLESS = {"vary": {"cycles": [100, 10**9]}, "replicate": 2, "seed": 3}
+#: Seconds longer than anything here takes, on a machine that has much else to do.
+TIMEOUT_S = 120
+
+
+def wait_for(what, is_true):
+    """Waits for something that happens soon."""
+    until = time.monotonic() + TIMEOUT_S
+    while not is_true():
+        assert time.monotonic() < until, f"waited too long for {what}"
+        time.sleep(0.02)
+
+
+def exists(process):
+    """Whether a process runs; not one that has ended and that nobody has asked about yet."""
+    try:
+        stat = pathlib.Path(f"/proc/{process}/stat").read_text()
+    except FileNotFoundError:
+        return False
+    return stat.rsplit(")", 1)[1].split()[0] not in "ZX"
+
+
+def children(process):
+    """The processes that a process has started."""
+    tasks = pathlib.Path(f"/proc/{process}/task").glob("*/children")
+    return [int(child) for task in tasks for child in task.read_text().split()]
+
+
+def stopped_sweep(floor, out):
+    """A driver whose workers have done the two short runs, and are in long ones."""
+    here = pathlib.Path(__file__).parent
+    driver = subprocess.Popen([sys.executable, "-c", FORKING_DRIVER, floor, out], cwd=here)
+    wait_for("two runs", lambda: begun(out) == 2)
+    workers = children(driver.pid)
+    assert len(workers) == 3
+    return driver, workers
+
+
+@forks
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in /proc")
+def test_workers_end_with_a_driver_that_is_killed_and_hold_no_lock(floor, tmp_path):
+    out = tmp_path / "s"
+    driver, workers = stopped_sweep(floor, out)
+    # One of them does not even notice that its driver is gone.
+    os.kill(workers[0], signal.SIGSTOP)
+    driver.kill()
+    driver.wait()
+    try:
+        assert not sidestep.sweep_status(out).is_active, "the lock went with the driver"
+        wait_for("idle and busy workers to end", lambda: not any(exists(worker) for worker in workers[1:]))
+    finally:
+        os.kill(workers[0], signal.SIGKILL)
+
+
+@forks
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in /proc")
+def test_a_share_that_is_being_run_is_refused_with_the_process_that_runs_it(floor, tmp_path):
+    out = tmp_path / "s"
+    driver, _ = stopped_sweep(floor, out)
+    try:
+        with pytest.raises(sidestep.InputError, match=rf"another process \({driver.pid}\) is running this share"):
+            sidestep.sweep(floor, **ENDLESS, out=out, workers=1)
+        assert sidestep.sweep_status(out).is_active
+    finally:
+        driver.kill()
+        driver.wait()
+
+
+class StrikingFork(ProcessPoolExecutor):
+    """A pool of forked workers of which the fifth task strikes its own driver with Ctrl-C."""
+
+    left = 5
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.left -= 1
+        if self.left == 0:
+            signal.raise_signal(signal.SIGINT)
+        return super().submit(fn, *args, **kwargs)
+
+
+@forks
+def test_the_same_call_goes_on_after_ctrl_c_with_a_pool_of_the_users_own(floor, tmp_path):
+    out = tmp_path / "s"
+    with StrikingFork(2, mp_context=FORK) as pool:
+        with pytest.raises(KeyboardInterrupt):
+            sidestep.sweep(floor, **MANY, out=out, engine=pool)
+        finished = len(sidestep.read(out)["results"]) if begun(out) else 0
+        swept = sidestep.sweep(floor, **MANY, out=out, engine=pool)
+        assert swept.output["took"]["runs"] == 24 - finished
+        assert pool.submit(int).result() == 0, "the pool is usable"
+    sidestep.sweep(floor, **MANY, out=tmp_path / "whole", workers=2)
+    assert files(out) == files(tmp_path / "whole")
+
+
+@forks
+def test_a_worker_of_something_else_is_left_alone():
+    """Only workers of sweeps end with their driver: others may outlive it on purpose."""
+    with ProcessPoolExecutor(1, mp_context=FORK) as pool:
+        names = pool.submit(_thread_names).result()
+    assert "sidestep-driver" not in names
+
+
+def _thread_names():
+    return [thread.name for thread in threading.enumerate()]
+
+
 def test_any_executor_gives_the_table_of_threads(floor, tmp_path):
     options = {"vary": VARY, "replicate": 4, "seed": 3}
     sidestep.sweep(floor, **options, out=tmp_path / "local")
