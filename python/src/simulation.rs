@@ -322,7 +322,7 @@ impl Simulation {
         if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
             scenario = Arc::new(scenario.reseeded(py, seed)?);
         }
-        let paths = OutputPaths { folder: out.as_deref(), mcap: None, replace };
+        let paths = OutputPaths { folder: out.as_deref(), replace, ..OutputPaths::default() };
         let simulation = Self::start(py, scenario, workers.0 as usize, paths)?;
         if let RecordArgument(Some(selection)) = record {
             let mut run = simulation.run.lock().unwrap_or_else(PoisonError::into_inner);

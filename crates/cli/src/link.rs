@@ -201,17 +201,17 @@ fn receive_messages(child: &mut Child) -> Receiver<LinkMessage> {
     messages
 }
 
+/// The remedy where the server of a fleet has ended unasked.
+pub(crate) const LOST_SERVER_REMEDY: &str = "its nodes end by themselves; start it again";
+
 fn exit_result(status: ExitStatus, error: Option<JobError>) -> Result<(), Failure> {
     match error {
         Some(error) => Err(error.into_error()),
         None if status.success() => Ok(()),
         None if interrupt::is_requested() => Err(Failure::Interrupted),
         None => {
-            let remedy = "its nodes end by themselves; a folder of --out continues with `sidestep resume DIR`";
-            Err(Failure::other(
-                format!("{LINK_PROGRAM} has ended before it was done ({status})"),
-                remedy,
-            ))
+            let cause = format!("{LINK_PROGRAM} has ended before it was done ({status})");
+            Err(Failure::other(cause, LOST_SERVER_REMEDY))
         }
     }
 }

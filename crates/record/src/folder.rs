@@ -10,6 +10,7 @@ use sidestep_kernel::ports::{RecordError, TableSchema};
 use crate::disk;
 use crate::file_list::{FileList, SharedFileList};
 use crate::manifest::{self, Manifest, Status, json};
+use crate::origin::CycleOrigin;
 use crate::parquet::ParquetRecorder;
 use crate::process_lock::{LockError, ProcessLock, holder_text};
 use crate::replacement::Replacement;
@@ -31,6 +32,8 @@ pub struct NewRun {
     pub origin: Provenance,
     /// Cycles that the scenario asks for.
     pub cycles_planned: u64,
+    /// How its cycles come about.
+    pub cycle_origin: CycleOrigin,
 }
 
 /// What to do if the folder holds a run already.
@@ -59,7 +62,9 @@ pub struct RunFolder {
     manifest: Manifest,
     scenario: String,
     /// The files that are written so far; the manifest gets them when it is written.
-    files: SharedFileList,
+    pub(crate) files: SharedFileList,
+    /// How the cycles come about that are recorded from now on.
+    pub(crate) cycle_origin: CycleOrigin,
     _lock: ProcessLock,
 }
 
@@ -92,6 +97,8 @@ impl RunFolder {
             build: Some(run.build.clone()),
             ..manifest::new_manifest(&run.world, *seed, program_version, run.cycles_planned)
         };
+        // A flight is marked before its first cycle: however early it is killed, it is not taken for a simulation.
+        manifest.record_progress(0, run.cycle_origin);
         fill(staging.path(), &mut manifest, scenario, files)
             .map_err(|e| disk::cannot_create(path, format!("{}: {}", e.place, e.cause)))?;
         // Another process may be writing the run that `commit` replaces: hold its lock until then.
@@ -105,15 +112,32 @@ impl RunFolder {
         let lock = lock(path)?;
         let scenario = scenario.clone();
         let files = SharedFileList::new(manifest.files.clone());
-        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, _lock: lock })
+        let cycle_origin = run.cycle_origin;
+        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, _lock: lock })
     }
 
-    /// Opens the folder at `path` to continue its run.
+    /// Opens the folder at `path` to continue its run by simulation.
     ///
     /// # Errors
-    /// No run folder; a run that is complete, or that another process writes; a damaged
+    /// No run folder; a run that is complete, or that another process writes; a flight in real time; a damaged
     /// manifest; another major format.
     pub fn resume(path: &Path) -> Result<(Self, ResumePoint), InputError> {
+        let folder = Self::reopen(path)?;
+        if folder.manifest.ends_in_flight() {
+            let cause = "a flight in real time cannot be continued";
+            let remedy = "give a folder whose run was simulated";
+            return Err(InputError::new(path.display(), cause, remedy));
+        }
+        let point = resume_point(&path.join(CHECKPOINT))?;
+        Ok((folder, point))
+    }
+
+    /// Opens the folder at `path` to write to it, a flight as well as a simulation; what is recorded from now on is
+    /// simulated.
+    ///
+    /// # Errors
+    /// Those of [`Self::resume`], except for a flight.
+    pub fn reopen(path: &Path) -> Result<Self, InputError> {
         check_is_run(path)?;
         let lock = lock(path)?;
         let reader = RunReader::open(path)?;
@@ -124,13 +148,13 @@ impl RunFolder {
         // Results are written anew, so it does not matter what became of them.
         reader.check_files(|name| !is_result(name))?;
         let RunReader { manifest, scenario, .. } = reader;
-        let point = resume_point(&path.join(CHECKPOINT))?;
         let mut files = manifest.files.clone();
         if !files.contains(SCENARIO) {
             files.insert(SCENARIO, FileDigest::of_bytes(scenario.as_bytes()));
         }
         let files = SharedFileList::new(files);
-        Ok((Self { path: path.to_path_buf(), manifest, scenario, files, _lock: lock }, point))
+        let cycle_origin = CycleOrigin::Simulated;
+        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, _lock: lock })
     }
 
     /// Returns the path of the folder, as it was given.
@@ -175,9 +199,12 @@ impl RunFolder {
     pub fn save_checkpoint(&mut self, cycle: u64, state: &[u8]) -> Result<(), RecordError> {
         disk::replace(&self.path.join(CHECKPOINT), state)?;
         self.files.lock().insert(CHECKPOINT, FileDigest::of_bytes(state));
+        let origin = self.cycle_origin;
         self.update(|manifest| {
             manifest.status = Status::Running;
-            manifest.cycles_done = cycle;
+            manifest.is_cut_off = false;
+            manifest.digest = None;
+            manifest.record_progress(cycle, origin);
             manifest.last_checkpoint = Some(cycle);
         })
     }
@@ -222,9 +249,10 @@ impl RunFolder {
     /// # Errors
     /// An I/O error; the folder can be resumed nevertheless.
     pub fn stop(mut self, cycles_done: u64) -> Result<(), RecordError> {
+        let origin = self.cycle_origin;
         self.update(|manifest| {
             manifest.status = Status::Incomplete;
-            manifest.cycles_done = cycles_done;
+            manifest.record_progress(cycles_done, origin);
         })
     }
 
@@ -234,15 +262,16 @@ impl RunFolder {
     /// # Errors
     /// An I/O error; the run can be resumed at its last checkpoint.
     pub fn complete(mut self, cycles_done: u64, digest: &str) -> Result<(), RecordError> {
+        let origin = self.cycle_origin;
         self.update(|manifest| {
             manifest.status = Status::Complete;
-            manifest.cycles_done = cycles_done;
+            manifest.record_progress(cycles_done, origin);
             manifest.digest = Some(digest.to_string());
         })
     }
 
     /// Changes the manifest on disk first: if that fails, this value still describes the folder.
-    fn update(&mut self, change: impl FnOnce(&mut Manifest)) -> Result<(), RecordError> {
+    pub(crate) fn update(&mut self, change: impl FnOnce(&mut Manifest)) -> Result<(), RecordError> {
         let mut changed = self.manifest.clone();
         change(&mut changed);
         changed.files = self.files.lock().clone();

@@ -4,7 +4,9 @@ mod disk;
 mod encode;
 mod file_list;
 mod file_manifest;
+mod flight;
 mod group;
+mod origin;
 mod part;
 mod process_lock;
 mod replacement;
@@ -27,6 +29,7 @@ pub mod verify;
 
 pub use file_list::{DamagedFile, FileFault, FileList, hash_file};
 pub use file_manifest::FileManifest;
+pub use flight::FlightProgress;
 pub use folder::{IfExists, NewRun, ResumePoint, RunFolder};
 pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
@@ -35,6 +38,7 @@ pub use mcap::{
     McapRunInfo, McapSceneReader, Playback, PlaybackPhase, PlaybackRequest, ServedRun, is_mcap,
     start_live_server,
 };
+pub use origin::{CycleOrigin, OriginRange, origins_text};
 pub use parquet::ParquetRecorder;
 pub use read::{Table, for_each_block, read_table, row_count, tables};
 pub use run_reader::RunReader;

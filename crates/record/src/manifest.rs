@@ -8,6 +8,7 @@ use sidestep_kernel::ports::RecordError;
 
 use crate::file_list::FileList;
 use crate::format::{self, FormatVersion};
+use crate::origin::OriginRange;
 use crate::sealed_json::{self, Seal};
 
 /// File by which a folder is known as that of a sweep.
@@ -53,6 +54,13 @@ pub struct Manifest {
     /// older versions have none.
     #[serde(default, skip_serializing_if = "FileList::is_empty")]
     pub files: FileList,
+    /// Whether each of the cycles done was flown or simulated, by rising cycles; early folders, all of which are
+    /// simulated, do not have it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub origins: Vec<OriginRange>,
+    /// Whether a flight in real time ended before its planned end: nothing can continue it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_cut_off: bool,
 }
 
 impl Manifest {
@@ -99,6 +107,8 @@ pub(crate) fn new_manifest(
         digest: None,
         last_checkpoint: None,
         files: FileList::default(),
+        origins: Vec::new(),
+        is_cut_off: false,
     }
 }
 

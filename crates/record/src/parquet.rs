@@ -6,6 +6,10 @@
 //! checkpoint [seals](sidestep_kernel::ports::Recorder::make_durable) the part; the name of the next one is
 //! the cycle at which it starts. So a folder without `.partial` holds every row of the run, and
 //! returning to a checkpoint at cycle C means deleting the parts that start at C or later.
+//!
+//! The rows of a flight in real time must be on disk within a second. A file for each second would be too many files, so
+//! there a part [grows](ParquetRecorder::with_growing_parts): each seal replaces it by one with more rows, in one step,
+//! until it has those of [`MAX_SEALS`] seals.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,6 +26,13 @@ use crate::group::RowGroup;
 use crate::part::{PartWriter, error_cause, first_cycle, next_cycle, part_name, parts};
 use crate::read::check_part;
 use crate::schema::{Provenance, check_schema, key_values, parquet_schema};
+
+/// Number of seals by which a part grows: of half a second each, 120 files an hour and table remain, and a part is
+/// written 60 times.
+const MAX_SEALS: u32 = 60;
+
+/// Number of rows with which a part does not grow any more: writing it again takes milliseconds.
+const MAX_GROWING_ROWS: usize = 1 << 16;
 
 /// Writes every table to Parquet files; the [module](self) describes their names.
 pub struct ParquetRecorder {
@@ -81,6 +92,13 @@ impl ParquetRecorder {
         Ok(Self { tables: tables.collect::<Result<_, _>>()?, broken: None })
     }
 
+    /// Lets parts grow from seal to seal, for a recorder that is sealed about twice a second.
+    #[must_use]
+    pub fn with_growing_parts(mut self) -> Self {
+        self.tables.iter_mut().for_each(TableWriter::let_parts_grow);
+        self
+    }
+
     /// Does `work` unless rows are missing already, and remembers a failure.
     fn run_unless_failed(
         &mut self,
@@ -122,8 +140,23 @@ struct TableWriter {
     part_cycle: u64,
     part: Option<PartWriter>,
     group: RowGroup,
+    growing: Option<GrowingPart>,
     finished: bool,
     files: SharedFileList,
+}
+
+/// The rows of a part that is written anew with each seal.
+struct GrowingPart {
+    columns: Vec<ColumnValues>,
+    /// Whether there are rows since the last seal.
+    has_unsealed: bool,
+    seals: u32,
+}
+
+impl GrowingPart {
+    fn rows(&self) -> usize {
+        self.columns.first().map_or(0, ColumnValues::len)
+    }
 }
 
 impl TableWriter {
@@ -145,15 +178,30 @@ impl TableWriter {
             folder,
             part_cycle: cycle,
             part: None,
+            growing: None,
             finished: false,
             files,
         })
+    }
+
+    fn let_parts_grow(&mut self) {
+        let columns = self.schema.columns.iter().map(|c| ColumnValues::empty(c.ty)).collect();
+        self.growing = Some(GrowingPart { columns, has_unsealed: false, seals: 0 });
     }
 
     fn append(&mut self, block: &[ColumnValues]) -> Result<(), RecordError> {
         if self.finished {
             return Err(RecordError::new(self.folder.display(), "the table is finished"));
         }
+        let Some(growing) = &mut self.growing else { return self.encode(block) };
+        for (column, values) in growing.columns.iter_mut().zip(block) {
+            column.append(values);
+        }
+        growing.has_unsealed |= block.first().is_some_and(|values| values.len() > 0);
+        Ok(())
+    }
+
+    fn encode(&mut self, block: &[ColumnValues]) -> Result<(), RecordError> {
         let rows = block[0].len();
         let mut start = 0;
         while start < rows {
@@ -185,8 +233,43 @@ impl TableWriter {
 
     /// Finishes the open part, if it has rows; later rows start at `next_cycle`.
     fn seal(&mut self, next_cycle: u64) -> Result<(), RecordError> {
+        if self.growing.is_some() {
+            return self.seal_growing(next_cycle);
+        }
         self.end_part(Some(next_cycle))?;
         self.part_cycle = next_cycle;
+        Ok(())
+    }
+
+    /// Seals the growing part; if it has grown enough, another one starts at `next_cycle`.
+    fn seal_growing(&mut self, next_cycle: u64) -> Result<(), RecordError> {
+        self.write_growing(Some(next_cycle))?;
+        let Some(growing) = &self.growing else { return Ok(()) };
+        let has_grown = growing.seals >= MAX_SEALS || growing.rows() >= MAX_GROWING_ROWS;
+        let is_empty = growing.rows() == 0;
+        if has_grown {
+            self.let_parts_grow();
+        }
+        if has_grown || is_empty {
+            self.part_cycle = next_cycle;
+        }
+        Ok(())
+    }
+
+    /// Replaces the growing part by one with all of its rows, if there are any since the last time.
+    fn write_growing(&mut self, next_cycle: Option<u64>) -> Result<(), RecordError> {
+        // Taken out, so that its rows are encoded and not kept a second time.
+        let Some(mut growing) = self.growing.take() else { return Ok(()) };
+        if growing.has_unsealed {
+            let path = disk::partial_path(&self.folder).join(part_name(self.part_cycle));
+            let (schema, pairs) = (self.parquet_schema.clone(), self.key_values.clone());
+            self.part = Some(PartWriter::create(path, schema, pairs)?);
+            self.encode(&growing.columns)?;
+            self.end_part(next_cycle)?;
+            growing.has_unsealed = false;
+            growing.seals += 1;
+        }
+        self.growing = Some(growing);
         Ok(())
     }
 
@@ -212,6 +295,7 @@ impl TableWriter {
         if self.finished {
             return Ok(());
         }
+        self.write_growing(None)?;
         self.end_part(None)?;
         let partial = disk::partial_path(&self.folder);
         if parts(&partial)?.is_empty() {
@@ -225,7 +309,7 @@ impl TableWriter {
 }
 
 /// Returns the path of a part in the list of the run's files.
-fn listed_name(table: &str, part: &str) -> String {
+pub(crate) fn listed_name(table: &str, part: &str) -> String {
     format!("{table}/{part}")
 }
 

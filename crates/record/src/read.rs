@@ -124,6 +124,21 @@ pub fn for_each_block<E: From<InputError>>(
     }
 }
 
+/// Returns the rows of one file of the table `name` with a cycle before `end`; all rows of a table without cycles.
+///
+/// # Errors
+/// A damaged file.
+pub(crate) fn read_part(path: &Path, name: &str, end: u64) -> Result<Table, InputError> {
+    let part = PartReader::open(path, name)?;
+    let mut table = part.empty_table(false);
+    let to = match position(&part.schema, CYCLE) {
+        Some(_) => Bound::Excluded(end),
+        None => Bound::Unbounded,
+    };
+    part.read_into(&mut table.columns, CycleRange { from: Bound::Unbounded, to })?;
+    Ok(table)
+}
+
 /// Returns the number of rows of a table that are complete, from the ends of its files: the rows are not read.
 ///
 /// # Errors

@@ -16,6 +16,8 @@ use crate::run_reader::{CHECKPOINT, LOCK, MANIFEST, RunReader, SCENARIO, SUMMARY
 /// Names that every run writes.
 const RUN_NAMES: [&str; 7] =
     [MANIFEST, LOCK, SCENARIO, CHECKPOINT, SUMMARY, "trajectories.svg", "trajectories.png"];
+/// The bytes of the largest process id, in decimal digits.
+const MAX_PROCESS_ID_BYTES: u64 = 10;
 /// The folder of the files that a scenario names.
 const INPUTS: &str = "inputs";
 
@@ -94,7 +96,7 @@ impl RunContent {
         match name.split_once('/') {
             _ if self.listed.contains(path) => true,
             None if name == MANIFEST => true,
-            None if name == LOCK => is_empty_file(&self.folder.join(path)),
+            None if name == LOCK => is_lock(&self.folder.join(path)),
             // A run that was killed early leaves folders without a part.
             None if self.folder.join(path).is_dir() => name.ends_with(".partial"),
             None => self.is_remains(&name),
@@ -133,8 +135,11 @@ impl RunContent {
     }
 }
 
-fn is_empty_file(path: &Path) -> bool {
-    fs::symlink_metadata(path).is_ok_and(|found| found.is_file() && found.len() == 0)
+/// Returns whether a file is a lock: it is empty, or holds the id of the process that was killed while it held it.
+fn is_lock(path: &Path) -> bool {
+    let is_file = fs::symlink_metadata(path).is_ok_and(|found| found.is_file());
+    let is_short = fs::metadata(path).is_ok_and(|found| found.len() <= MAX_PROCESS_ID_BYTES);
+    is_file && is_short && fs::read(path).is_ok_and(|text| text.iter().all(u8::is_ascii_digit))
 }
 
 pub(crate) fn unreadable(folder: &Path, error: &io::Error) -> InputError {

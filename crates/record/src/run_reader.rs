@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 use sidestep_kernel::InputError;
 use sidestep_kernel::checkpoint::decode_header;
 
-use crate::file_list::DamagedFile;
+use crate::file_list::{DamagedFile, FileFault};
 use crate::manifest::{Manifest, Status};
+use crate::part::next_cycle;
+use crate::read::check_part;
 use crate::sealed_json::Seal;
 
 /// File name of the manifest.
@@ -68,8 +70,26 @@ impl RunReader {
     pub fn damaged_files(&self, is_wanted: impl Fn(&str) -> bool) -> Vec<DamagedFile> {
         let mut damaged = self.manifest.files.damaged_in(&self.path, is_wanted);
         let checkpoint = self.path.join(CHECKPOINT);
-        damaged.retain(|file| file.path != checkpoint || !self.is_newer_checkpoint(&checkpoint));
+        damaged.retain(|file| {
+            let is_checkpoint = file.path == checkpoint;
+            !(is_checkpoint && self.is_newer_checkpoint(&checkpoint) || self.is_newer_part(file))
+        });
         damaged
+    }
+
+    /// Returns whether a part of a flight is whole, and newer than the manifest: it grows while the flight lasts, and is
+    /// written first.
+    fn is_newer_part(&self, file: &DamagedFile) -> bool {
+        let DamagedFile { path, fault } = file;
+        let is_flying = self.manifest.status == Status::Running && self.manifest.ends_in_flight();
+        if !is_flying || *fault != FileFault::Changed {
+            return false;
+        }
+        let table = path.parent().and_then(Path::file_name).and_then(|name| name.to_str());
+        let table = table.unwrap_or_default().trim_end_matches(".partial");
+        let end = next_cycle(path).ok().flatten();
+        let is_newer = end.is_some_and(|end| end > self.manifest.cycles_done);
+        is_newer && check_part(path, table).is_ok()
     }
 
     /// Returns whether a checkpoint is whole, and newer than the manifest: a run writes it first.

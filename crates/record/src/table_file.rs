@@ -8,7 +8,9 @@ use sidestep_kernel::ports::{ColumnValues, RecordError, TableSchema};
 use crate::disk;
 use crate::group::RowGroup;
 use crate::part::{PartWriter, error_cause};
+use crate::read::Table;
 use crate::schema::{Provenance, check_schema, key_values, parquet_schema};
+use crate::sealed_json::FileDigest;
 
 /// The writer of a table to one file, with the same key-value pairs as a run's own parts. If it is
 /// dropped before it is finished, it deletes the file.
@@ -68,13 +70,34 @@ impl TableFileWriter {
     ///
     /// # Errors
     /// An I/O error.
-    pub fn finish(mut self) -> Result<(), RecordError> {
+    pub fn finish(self) -> Result<(), RecordError> {
+        self.finish_before(None).map(drop)
+    }
+
+    /// Finishes the file as a part of a run's table, of which the next part starts at `next_cycle`.
+    fn finish_before(mut self, next_cycle: Option<u64>) -> Result<FileDigest, RecordError> {
         if !self.group.is_empty() {
             self.write_row_group()?;
         }
-        let ended = self.part.take().map_or(Ok(()), |part| part.close(None).map(drop));
+        let part = self.part.take().expect("open until the file is finished");
+        let ended = part.close(next_cycle);
         ended.inspect_err(|_| drop(std::fs::remove_file(disk::partial_path(&self.path))))
     }
+}
+
+/// Replaces a part of a run's table by the rows of `table`, all of which are of cycles before `next_cycle`. Returns the
+/// digest of the new bytes.
+///
+/// # Errors
+/// An I/O error; the part stays as it was.
+pub(crate) fn write_part(
+    path: &Path,
+    table: &Table,
+    next_cycle: u64,
+) -> Result<FileDigest, RecordError> {
+    let mut file = TableFileWriter::create(path, &table.schema, &table.origin)?;
+    file.append(&table.columns)?;
+    file.finish_before(Some(next_cycle))
 }
 
 impl Drop for TableFileWriter {

@@ -1,6 +1,7 @@
 //! What any file or folder that this program reads is, and what becomes of it when it is read.
 
 use crate::files::replace_atomically;
+use crate::flight::cut_off_text;
 use crate::sweep::check_variants;
 use crate::{Error, write_atomically};
 use serde::Serialize;
@@ -10,7 +11,7 @@ use sidestep_import::traffic::{self, TrafficOptions};
 use sidestep_import::{ForeignFormat, bag, carmen, clean_map};
 use sidestep_kernel::InputError;
 use sidestep_record::sweep::SweepFolder;
-use sidestep_record::{McapRunInfo, RunReader, Status, is_mcap, row_count, tables};
+use sidestep_record::{McapRunInfo, RunReader, Status, is_mcap, origins_text, row_count, tables};
 use sidestep_scenario::file::{packed_error, read_start};
 use sidestep_scenario::{ImportOptions, ImportReport, Source, Treatment, Worlds};
 use std::io::Write;
@@ -121,6 +122,10 @@ fn own_recording(path: &Path) -> Result<Option<ImportReport>, Error> {
     Ok(McapRunInfo::open(path).ok().map(|run| recording_report(&run)))
 }
 
+/// Of a flight whose folder does not say how it ended.
+const UNCLOSED_FLIGHT: &str =
+    "the flight is under way, or was killed: its tables reach to its last second";
+
 fn run_report(path: &Path) -> Result<ImportReport, InputError> {
     let run = RunReader::open(path)?;
     run.check_files(|_| true)?;
@@ -134,7 +139,15 @@ fn run_report(path: &Path) -> Result<ImportReport, InputError> {
         let rows = row_count(path, &table)?;
         report.add_kept(format!("rows of {table}"), rows as usize);
     }
-    if manifest.status != Status::Complete {
+    if manifest.is_flight() {
+        report.add_fact("flown or simulated", origins_text(&manifest.all_origins()));
+    }
+    if manifest.ends_in_flight() && manifest.status != Status::Complete {
+        let end = cut_off_text(manifest.cycles_done, manifest.cycles_planned);
+        let text = if manifest.is_cut_off { end } else { UNCLOSED_FLIGHT.to_string() };
+        let remedy = "close its recording with `sidestep resume`, if its server is gone";
+        report.record(Treatment::Noted, text, "", if manifest.is_cut_off { "" } else { remedy });
+    } else if manifest.status != Status::Complete {
         report.record(
             Treatment::Noted,
             "the run has not ended: its tables reach to its last checkpoint",

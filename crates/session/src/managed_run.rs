@@ -3,19 +3,20 @@
 use crate::VERSION;
 use crate::driver::{RunTiming, Sinks, drive};
 use crate::files::resolve_path;
+use crate::flight::{flight_error, replay_flight};
 use crate::frame_sink::{EndReason, FrameRows, FrameSink, McapSink, frame_rows};
 use crate::identity::Producer;
 use crate::live::{LiveControl, ViewerAddress};
 use crate::orders::has_orders;
 use crate::row_store::{RowSelection, RowStore};
-use crate::run_recorder::{RunRecorder, restore_run};
+use crate::run_recorder::{RecordingPlan, RunRecorder, restore_run};
 use crate::summary::{RunCost, RunStatus, Summary, SummaryFile};
 use crate::{Error, Watcher, picture};
 use sidestep_kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
 use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, InputError, Simulation};
-use sidestep_record::{IfExists, McapRecorder, RunFolder};
+use sidestep_record::{CycleOrigin, IfExists, McapRecorder, RunFolder, RunReader, Status};
 use sidestep_scenario::{CompiledScenario, ImportedScenario, ResolvedScenario, Source, Worlds};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -56,6 +57,8 @@ pub struct OutputPaths<'a> {
     pub mcap: Option<(&'a Path, Cycle)>,
     /// Whether existing files and folders there are replaced.
     pub replace: bool,
+    /// How the cycles come about: those of a flight in real time are in the folder within a second.
+    pub cycle_origin: CycleOrigin,
 }
 
 impl OutputPaths<'_> {
@@ -117,7 +120,9 @@ impl OutputPaths<'_> {
         build: &str,
     ) -> Result<Option<RunRecorder>, Error> {
         let Some(folder) = self.folder else { return Ok(None) };
-        RunRecorder::create(folder, resolved, run, self.if_exists(), build).map(Some)
+        let recording =
+            RecordingPlan { existing: self.if_exists(), build, cycle_origin: self.cycle_origin };
+        RunRecorder::create(folder, resolved, run, recording).map(Some)
     }
 
     /// Returns whether the MCAP file lies in the folder, which then has to exist before the file.
@@ -169,21 +174,38 @@ impl ManagedRun {
         workers: usize,
         until: Option<Cycle>,
     ) -> Result<Self, Error> {
+        let manifest = RunReader::open(path)?.manifest;
+        if manifest.ends_in_flight() && manifest.status != Status::Complete {
+            return Err(flight_error(path, &manifest).into());
+        }
         let (folder, point) = RunFolder::resume(path)?;
-        let manifest = folder.manifest();
-        let producer =
-            Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
-        producer.check(worlds.build(), path, "run", |wrote| {
-            format!("continue it with sidestep {wrote}, or run its scenario again in a new folder")
-        })?;
-        let place = path.join("scenario.toml").display().to_string();
-        let source = Source::new(place, folder.scenario(), path);
-        let mut run = worlds.compile(&source)?.start(&source, workers);
+        let mut run = start_recorded(worlds, &folder, workers)?;
         restore_run(run.as_mut(), &point, path)?;
         check_end(until, run.cycle(), run.config().cycles)?;
         refuse_without_orders(run.as_ref(), path)?;
         let recording = Some(RunRecorder::start(folder, run.as_mut())?);
         Ok(Self { until, ..Self::new(worlds, run, recording, None, workers) })
+    }
+
+    /// Returns a flight in real time that was cut off at its end, to be simulated from there: what comes of it is marked as
+    /// simulated, and was flown by nobody.
+    ///
+    /// # Errors
+    /// Those of [`Self::resume`].
+    pub fn simulate_flight(
+        worlds: &Worlds,
+        path: &Path,
+        workers: usize,
+        until: Option<Cycle>,
+    ) -> Result<Self, Error> {
+        let folder = RunFolder::reopen(path)?;
+        let mut run = start_recorded(worlds, &folder, workers)?;
+        replay_flight(run.as_mut(), &folder)?;
+        check_end(until, run.cycle(), run.config().cycles)?;
+        let mut recording = RunRecorder::start(folder, run.as_mut())?;
+        // From here on it is a simulation, however early it is killed.
+        recording.save_checkpoint(run.as_ref())?;
+        Ok(Self { until, ..Self::new(worlds, run, Some(recording), None, workers) })
     }
 
     fn new(
@@ -355,6 +377,27 @@ impl ManagedRun {
     }
 }
 
+/// Returns the run of a folder at its start.
+///
+/// # Errors
+/// When the folder holds no run of one of `worlds` that this build can continue.
+pub(crate) fn start_recorded(
+    worlds: &Worlds,
+    folder: &RunFolder,
+    workers: usize,
+) -> Result<Box<dyn Simulation>, InputError> {
+    let path = folder.path();
+    let manifest = folder.manifest();
+    let producer =
+        Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
+    producer.check(worlds.build(), path, "run", |wrote| {
+        format!("continue it with sidestep {wrote}, or run its scenario again in a new folder")
+    })?;
+    let place = path.join("scenario.toml").display().to_string();
+    let source = Source::new(place, folder.scenario(), path);
+    Ok(worlds.compile(&source)?.start(&source, workers))
+}
+
 /// Refuses to continue a run whose agents had orders: they would get no more orders.
 fn refuse_without_orders(run: &dyn Simulation, folder: &Path) -> Result<(), InputError> {
     if !has_orders(folder)? {
@@ -411,12 +454,13 @@ fn store(
     watcher: &dyn Watcher,
 ) -> Result<(), Error> {
     let closed = match summary.status {
-        RunStatus::Complete => recording.finish_tables(),
+        RunStatus::Complete => recording.finish_tables(run),
         RunStatus::Incomplete => recording.save_unfinished(run),
     };
     closed
         .and_then(|()| recording.forget_results())
         .map_err(|e| storage_error(run, Some(&recording), &e))?;
+    let is_flight = recording.is_in_flight();
     let folder = recording.into_folder();
     // The results are worth more than their picture, so its failure is a warning.
     if let Err(error) = picture::draw_run(run, &folder) {
@@ -430,6 +474,7 @@ fn store(
     }
     match summary.status {
         RunStatus::Complete => folder.complete(run.cycle(), &summary.digest)?,
+        RunStatus::Incomplete if is_flight => folder.cut_off(run.cycle(), Some(&summary.digest))?,
         RunStatus::Incomplete => folder.stop(run.cycle())?,
     }
     Ok(())
@@ -486,9 +531,13 @@ fn storage_error(
     recording: Option<&RunRecorder>,
     error: &RecordError,
 ) -> Error {
-    let remedy = match recording.map(|r| r.folder().path()) {
-        Some(folder) => {
+    let remedy = match recording.map(|r| (r.folder().path(), r.is_in_flight())) {
+        Some((folder, false)) => {
             format!("make room, then continue with `{}`", sidestep_command("resume", folder))
+        }
+        Some((folder, true)) => {
+            let close = sidestep_command("resume", folder);
+            format!("make room, then close the recording of the flight with `{close}`")
         }
         None => "make room, then run it again; without --out nothing can be continued".into(),
     };

@@ -7,8 +7,9 @@ use crate::playback::RecordedPlayback;
 use crate::run_recorder::{restore_run, write_inputs};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::checkpoint::decode_header;
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::{Cycle, InputError};
-use sidestep_record::{McapRunInfo, ResumePoint, RunReader, Status, is_mcap, tables};
+use sidestep_record::{McapRunInfo, OriginRange, ResumePoint, RunReader, Status, is_mcap, tables};
 use sidestep_scenario::ResolvedScenario;
 use sidestep_scenario::{Source, Worlds};
 use std::path::{Path, PathBuf};
@@ -25,6 +26,12 @@ pub struct RecordedRun {
     pub cycles_done: Cycle,
     /// Digest of the state after these cycles, if it is known.
     pub digest: Option<String>,
+    /// How each of the cycles came about, by rising cycles; empty for an MCAP file, which does not say so.
+    pub origins: Vec<OriginRange>,
+    /// Whether it is a flight in real time, at least up to a cycle from which it was simulated.
+    pub is_flight: bool,
+    /// Whether it is a flight that ended before its planned end, and was closed.
+    pub is_cut_off: bool,
     /// The run folder; `None` for an MCAP file, which has neither tables nor checkpoints.
     pub folder: Option<PathBuf>,
     source: Source,
@@ -54,6 +61,7 @@ impl RecordedRun {
         let view = RunReader::open(path)?;
         view.check_files(|_| true)?;
         let place = path.join("scenario.toml").display().to_string();
+        let (origins, is_flight) = (view.manifest.all_origins(), view.manifest.is_flight());
         Ok(Self {
             path: path.to_path_buf(),
             worlds: worlds.clone(),
@@ -63,6 +71,9 @@ impl RecordedRun {
             },
             is_complete: view.manifest.status == Status::Complete,
             cycles_done: view.manifest.cycles_done,
+            origins,
+            is_flight,
+            is_cut_off: view.manifest.is_cut_off,
             digest: view.manifest.digest,
             folder: Some(path.to_path_buf()),
             source: Source::new(place, view.scenario, path),
@@ -84,6 +95,9 @@ impl RecordedRun {
             is_complete: run.status == Status::Complete,
             cycles_done: run.cycles_done,
             digest: Some(run.digest),
+            origins: Vec::new(),
+            is_flight: false,
+            is_cut_off: false,
             folder: None,
             source: Source::new(place, run.scenario, files.path()),
             base: files.path().to_path_buf(),
@@ -115,6 +129,18 @@ impl RecordedRun {
     /// When the folder can no longer be read.
     pub fn tables(&self) -> Result<Vec<String>, InputError> {
         self.folder.as_ref().map_or(Ok(Vec::new()), |folder| tables(folder))
+    }
+
+    /// Refuses a recording of which nothing is on disk.
+    ///
+    /// # Errors
+    /// When it was killed before its first rows were written.
+    pub fn check_has_content(&self) -> Result<(), InputError> {
+        let is_begun = self.is_complete || self.cycles_done > 0 || self.folder.is_none();
+        if is_begun || !(self.is_flight || self.tables()?.is_empty()) {
+            return Ok(());
+        }
+        Err(nothing_recorded(&self.path, self.is_flight))
     }
 
     /// Returns the run at its start.
@@ -227,6 +253,17 @@ fn explain_partial(path: &Path, error: InputError) -> InputError {
     let cause = "this is an MCAP file that is still being written, or whose process was killed: its end is missing";
     let remedy = "if its run has a folder, `sidestep resume DIR` and then `sidestep export DIR --to mcap` make it whole; \
                   else run the scenario again";
+    InputError::new(path.display(), cause, remedy)
+}
+
+/// Returns the error of a recording of which nothing is on disk.
+pub(crate) fn nothing_recorded(path: &Path, is_flight: bool) -> InputError {
+    let cause = "nothing of this run is on disk: it was killed before its first rows were written, or has just begun";
+    let remedy = if is_flight {
+        "wait until it has flown for a second, or fly it again with --replace".to_string()
+    } else {
+        format!("run it with `{}`", sidestep_command("resume", path))
+    };
     InputError::new(path.display(), cause, remedy)
 }
 

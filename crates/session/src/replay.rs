@@ -32,6 +32,14 @@ pub fn replay_all(
     workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<ReplayReport, Error> {
+    if recorded.is_flight && recorded.digest.is_none() {
+        let cause = format!(
+            "the flight was cut off after {} cycles: no digest of its last state is recorded",
+            recorded.cycles_done
+        );
+        let remedy = format!("give a --cycle, 0 to {}", recorded.cycles_done);
+        return Err(InputError::new(recorded.path.display(), cause, remedy).into());
+    }
     if recorded.digest.is_none() {
         let resume = sidestep_command("resume", &recorded.path);
         let remedy = format!("end it with `{resume}`, or give a --cycle");

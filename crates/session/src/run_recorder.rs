@@ -2,10 +2,13 @@
 
 use crate::Error;
 use crate::VERSION;
+use crate::flight_recorder::FlightRecorder;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::ports::{RecordError, Recorder};
 use sidestep_kernel::{Cycle, InputError};
-use sidestep_record::{IfExists, NewRun, ParquetRecorder, Provenance, ResumePoint, RunFolder};
+use sidestep_record::{
+    CycleOrigin, IfExists, NewRun, ParquetRecorder, Provenance, ResumePoint, RunFolder,
+};
 use sidestep_scenario::ResolvedScenario;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -18,14 +21,33 @@ const BLOCK_CYCLES: Cycle = 1024;
 /// A folder, its recorder, and the times of its checkpoints.
 pub struct RunRecorder {
     folder: RunFolder,
-    recorder: ParquetRecorder,
+    rows: RowWriter,
     checkpoint_every: Cycle,
     /// Time spent on recording.
     elapsed: Duration,
 }
 
+/// The writer of a run's rows.
+enum RowWriter {
+    /// It writes when rows are handed over, at cycles that are a function of the scenario.
+    Simulation(ParquetRecorder),
+    /// It writes in a thread of its own, by the clock.
+    Flight(FlightRecorder),
+}
+
+/// What a new folder is made for.
+#[derive(Debug, Clone, Copy)]
+pub struct RecordingPlan<'a> {
+    /// What to do with an earlier run there.
+    pub existing: IfExists,
+    /// The build that makes the run.
+    pub build: &'a str,
+    /// How its cycles come about.
+    pub cycle_origin: CycleOrigin,
+}
+
 impl RunRecorder {
-    /// Creates a new folder at `path`, with the resolved scenario in it; `build` makes the run.
+    /// Creates a new folder at `path`, with the resolved scenario in it.
     ///
     /// # Errors
     /// A folder that may not be used, or an I/O error.
@@ -33,22 +55,22 @@ impl RunRecorder {
         path: &Path,
         resolved: &ResolvedScenario,
         run: &mut dyn Simulation,
-        existing: IfExists,
-        build: &str,
+        recording: RecordingPlan<'_>,
     ) -> Result<Self, Error> {
         let plan = run.config();
         let new = NewRun {
             world: run.world_name().into(),
-            build: build.into(),
+            build: recording.build.into(),
             origin: Provenance {
                 program_version: VERSION.into(),
                 scenario: resolved.text.clone(),
                 seed: plan.seed,
             },
             cycles_planned: plan.cycles,
+            cycle_origin: recording.cycle_origin,
         };
-        let folder = RunFolder::create_with_files(path, &new, &resolved.files, existing)?;
-        Ok(Self::start(folder, run)?)
+        let folder = RunFolder::create_with_files(path, &new, &resolved.files, recording.existing)?;
+        Ok(Self::start_as(folder, run, recording.cycle_origin)?)
     }
 
     /// Continues the recording of a run that is at the checkpoint of its folder.
@@ -56,10 +78,24 @@ impl RunRecorder {
     /// # Errors
     /// An I/O error.
     pub(crate) fn start(folder: RunFolder, run: &mut dyn Simulation) -> Result<Self, RecordError> {
+        Self::start_as(folder, run, CycleOrigin::Simulated)
+    }
+
+    fn start_as(
+        folder: RunFolder,
+        run: &mut dyn Simulation,
+        cycle_origin: CycleOrigin,
+    ) -> Result<Self, RecordError> {
         run.start_recording();
         let recorder = folder.recorder(&run.schemas(), run.cycle())?;
+        let rows = match cycle_origin {
+            CycleOrigin::Simulated => RowWriter::Simulation(recorder),
+            CycleOrigin::Flown => {
+                RowWriter::Flight(FlightRecorder::start(recorder, Some(folder.progress())))
+            }
+        };
         let checkpoint_every = run.config().checkpoint_interval();
-        Ok(Self { folder, recorder, checkpoint_every, elapsed: Duration::ZERO })
+        Ok(Self { folder, rows, checkpoint_every, elapsed: Duration::ZERO })
     }
 
     /// Returns the first cycle after `cycle` at which rows must be passed on.
@@ -73,36 +109,67 @@ impl RunRecorder {
     /// An I/O error.
     pub(crate) fn record(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         let started = Instant::now();
-        run.record(&mut self.recorder)?;
-        if run.cycle().is_multiple_of(self.checkpoint_every) {
-            self.save_checkpoint(run)?;
+        let is_checkpoint_due = run.cycle().is_multiple_of(self.checkpoint_every);
+        match &mut self.rows {
+            RowWriter::Simulation(recorder) => {
+                run.record(recorder)?;
+                if is_checkpoint_due {
+                    self.save_checkpoint(run)?;
+                }
+            }
+            RowWriter::Flight(recorder) => {
+                run.record(recorder)?;
+                recorder.seal_if_due(run.cycle(), is_checkpoint_due)?;
+            }
         }
         self.elapsed += started.elapsed();
         Ok(())
     }
 
     /// Makes everything recorded so far durable. The tables are sealed first: a checkpoint that is newer than the rows
-    /// before it could not be resumed from.
-    fn save_checkpoint(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
-        self.recorder.make_durable(run.cycle())?;
-        self.folder.save_checkpoint(run.cycle(), &run.checkpoint())
+    /// before it could not be resumed from. A flight has no checkpoints: nothing can continue it.
+    pub(crate) fn save_checkpoint(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
+        match &mut self.rows {
+            RowWriter::Simulation(recorder) => {
+                recorder.make_durable(run.cycle())?;
+                self.folder.save_checkpoint(run.cycle(), &run.checkpoint())
+            }
+            RowWriter::Flight(recorder) => recorder.make_durable(run.cycle()),
+        }
     }
 
     /// Declares the tables complete; reports and pictures may follow.
     ///
     /// # Errors
     /// An I/O error.
-    pub(crate) fn finish_tables(&mut self) -> Result<(), RecordError> {
-        self.recorder.finish()
+    pub(crate) fn finish_tables(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
+        match &mut self.rows {
+            RowWriter::Simulation(recorder) => recorder.finish(),
+            RowWriter::Flight(recorder) => {
+                recorder.make_durable(run.cycle())?;
+                recorder.finish()
+            }
+        }
     }
 
-    /// Saves a run that stops before its end.
+    /// Saves a run that stops before its end: a simulation to be resumed, a flight with tables that are complete.
     ///
     /// # Errors
     /// An I/O error.
     pub(crate) fn save_unfinished(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
-        run.record(&mut self.recorder)?;
+        match &mut self.rows {
+            RowWriter::Simulation(recorder) => run.record(recorder)?,
+            RowWriter::Flight(recorder) => {
+                run.record(recorder)?;
+                return self.finish_tables(run);
+            }
+        }
         self.save_checkpoint(run)
+    }
+
+    /// Returns whether it records a flight in real time.
+    pub(crate) fn is_in_flight(&self) -> bool {
+        matches!(self.rows, RowWriter::Flight(_))
     }
 
     pub(crate) fn folder(&self) -> &RunFolder {

@@ -9,6 +9,7 @@ use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::{Cycle, InputError};
+use sidestep_record::origins_text;
 use sidestep_session::export::{self, AnimationOptions, ExportRequest, ExportResult};
 use sidestep_session::{RecordedRun, display_path};
 use std::path::{Path, PathBuf};
@@ -23,7 +24,8 @@ Examples:
   sidestep export runs/office --to png --from 1234  one moment
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
 
-Tables are copied from the run folder. Everything else is computed again from the recorded \
+Tables are copied from the run folder; those of a flight in real time come with a file that says \
+which cycles were flown and which simulated. Everything else is computed again from the recorded \
 scenario; an export that includes the recorded end confirms the recorded digest there.";
 
 /// The output formats.
@@ -136,16 +138,33 @@ pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Fa
     check_options(args)?;
     let recorded = RecordedRun::open(worlds(), &args.recorded)?;
     interrupt::listen()?;
-    if args.to.is_table() && recorded.folder.is_some() && !recorded.is_complete {
-        console.warn("the run is not complete: its rows end at the last checkpoint");
+    if let Some(warning) = incomplete_warning(&recorded) {
+        console.warn(&warning);
     }
     match export::export(&recorded, &export_request(args), &ConsoleWatcher::new(console)) {
         Err(Failure::Interrupted) => Ok(ExitCode::Interrupted),
         result => {
-            print_result(args.to, &result?, console)?;
+            print_result(args.to, &recorded, &result?, console)?;
             Ok(ExitCode::Done)
         }
     }
+}
+
+/// Returns what a user has to know of a run that did not reach its end.
+fn incomplete_warning(recorded: &RecordedRun) -> Option<String> {
+    if recorded.is_complete || recorded.folder.is_none() {
+        return None;
+    }
+    let cycles = group_thousands(recorded.cycles_done);
+    Some(if recorded.is_cut_off {
+        format!("the flight was cut off: its rows end at cycle {cycles}")
+    } else if recorded.is_flight {
+        format!(
+            "the flight is under way, or was killed: its rows end at cycle {cycles}, or within a second of it"
+        )
+    } else {
+        "the run is not complete: its rows end at the last checkpoint".to_string()
+    })
 }
 
 fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
@@ -194,12 +213,14 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
 /// Prints which files were written.
 fn print_result(
     format: ExportFormat,
+    recorded: &RecordedRun,
     written: &ExportResult,
     console: Console,
 ) -> Result<(), Failure> {
     let ExportResult { paths, is_confirmed, film: animation } = written;
     let shown: Vec<String> = paths.iter().map(display_path).collect();
-    let json = json!({ "written": shown, "digest_confirmed": is_confirmed });
+    let origins = &recorded.origins;
+    let json = json!({ "written": shown, "digest_confirmed": is_confirmed, "origins": origins });
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
     console.print_result_or_short(&json, &names, || {
         let confirmed = if *is_confirmed { "  its end has the recorded digest\n" } else { "" };
@@ -210,7 +231,11 @@ fn print_result(
         let animation = animation.map_or(String::new(), |(pictures, fps)| {
             animation_text(format, pictures, fps, &paths[0])
         });
-        format!("{names}{size}{confirmed}{animation}")
+        let origins = match recorded.is_flight {
+            true => format!("  {}\n", origins_text(origins)),
+            false => String::new(),
+        };
+        format!("{names}{size}{confirmed}{origins}{animation}")
     })
 }
 

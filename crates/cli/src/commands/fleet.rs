@@ -3,7 +3,7 @@
 use crate::console::{Console, align_pairs, group_thousands};
 use crate::exit::{ExitCode, Failure};
 use crate::fleet_table::FleetTable;
-use crate::link::{LinkArgs, run_job};
+use crate::link::{LOST_SERVER_REMEDY, LinkArgs, run_job};
 use crate::scenario_args::ScenarioArgs;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -28,8 +28,9 @@ Examples:
                                            rules are local: see the book
 
 The program sidestep-link does it: `cargo install --path crates/link`. In lockstep a fleet comes \
-out as `sidestep run` does, bit for bit. Ctrl-C ends all of its processes; what is recorded \
-continues with `sidestep resume DIR`.";
+out as `sidestep run` does, bit for bit. Ctrl-C ends all of its processes; a fleet in lockstep \
+continues with `sidestep resume DIR`. A flight in real time is on disk up to the last second, \
+whatever ends it, and is not continued.";
 
 /// How time passes, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -127,13 +128,10 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     match result {
         Ok(()) => Ok(ExitCode::Done),
         Err(Failure::Interrupted) => {
-            if let Some(folder) = &args.out {
-                let resume = sidestep_command("resume", folder);
-                console.note(format!("The run is incomplete; `{resume}` continues it."));
-            }
+            args.print_next_step(console);
             Ok(ExitCode::Interrupted)
         }
-        Err(failure) => Err(failure),
+        Err(failure) => Err(args.with_remedy(failure)),
     }
 }
 
@@ -157,6 +155,41 @@ impl FleetArgs {
             out: self.out.clone(),
             replace: self.replace,
             packets: self.packets,
+        }
+    }
+
+    fn print_next_step(&self, console: Console) {
+        let Some(folder) = &self.out else { return };
+        let resume = sidestep_command("resume", folder);
+        console.note(match self.clock {
+            ClockArg::Lockstep => format!("The run is incomplete; `{resume}` continues it."),
+            ClockArg::Realtime => {
+                let report = sidestep_command("report", folder);
+                format!(
+                    "The flight is cut off here, and what was flown is kept; `{report}` shows it."
+                )
+            }
+        });
+    }
+
+    /// Returns the failure of a fleet whose server has ended unasked, with what can be done with its folder.
+    fn with_remedy(&self, failure: Failure) -> Failure {
+        match (&self.out, failure) {
+            (Some(folder), Failure::Other { cause, remedy })
+                if remedy == LOST_SERVER_REMEDY && self.clock == ClockArg::Realtime =>
+            {
+                let resume = sidestep_command("resume", folder);
+                let kept = "what was flown is on disk up to the last second";
+                Failure::other(cause, format!("{kept}: `{resume}` closes its recording"))
+            }
+            (Some(folder), Failure::Other { cause, remedy }) if remedy == LOST_SERVER_REMEDY => {
+                let resume = sidestep_command("resume", folder);
+                Failure::other(
+                    cause,
+                    format!("its nodes end by themselves; `{resume}` continues it"),
+                )
+            }
+            (_, failure) => failure,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::finish::run_to_end;
 use crate::console::{Console, group_thousands};
+use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::scenario_args::WorkersArg;
@@ -12,7 +13,7 @@ use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_record::{RunReader, Status};
 use sidestep_session::sweep::Folder;
-use sidestep_session::{ManagedRun, read_summary};
+use sidestep_session::{ManagedRun, close_flight, read_summary};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -23,7 +24,9 @@ Examples:
   sidestep resume runs/office --cycles 20000     to cycle 20000 only
 
 The result has the same digest and the same rows as an uninterrupted run. Of a run that is complete \
-already, the result is printed and nothing is written.";
+already, the result is printed and nothing is written. A flight in real time is not continued: its \
+recording is closed where it ends, and the exit code is 1. With --simulate the other cycles are \
+computed, and marked as simulated.";
 
 /// Continue a recorded run or a sweep that was stopped or killed.
 #[derive(Debug, Args)]
@@ -35,6 +38,10 @@ pub(crate) struct ResumeArgs {
 
     #[command(flatten)]
     workers: WorkersArg,
+
+    /// Simulate the cycles that a flight in real time has not flown; they are marked as simulated
+    #[arg(long)]
+    simulate: bool,
 
     /// Stop at this cycle [default: the planned end]
     #[arg(long, value_name = "N")]
@@ -51,11 +58,36 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     if reader.manifest.status == Status::Complete && args.cycles.is_none() {
         return print_finished(&reader, console);
     }
+    if reader.manifest.ends_in_flight() {
+        return resume_flight(args, console);
+    }
+    if args.simulate && !reader.manifest.is_flight() {
+        let cause = "this run was simulated from its start";
+        let remedy = "leave it out: it is for flights in real time";
+        return Err(InputError::new("--simulate", cause, remedy).into());
+    }
     let workers = args.workers.count();
     interrupt::listen()?;
     let run = ManagedRun::resume(worlds(), &args.folder, workers, args.cycles)?;
     let cycle = group_thousands(run.cycle());
     console.note(format!("Continuing {} at cycle {cycle}", args.folder.display()));
+    run_to_end(run, console)
+}
+
+/// Closes the recording of a flight, and simulates the rest only if the user asks for it.
+fn resume_flight(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure> {
+    interrupt::listen()?;
+    let flight = close_flight(worlds(), &args.folder, &ConsoleWatcher::new(console))?;
+    if !args.simulate {
+        console.print_result(&flight.summary, String::new)?;
+        return Err(flight.to_error());
+    }
+    let workers = args.workers.count();
+    let run = ManagedRun::simulate_flight(worlds(), &args.folder, workers, args.cycles)?;
+    let (folder, cycle) = (args.folder.display(), group_thousands(run.cycle()));
+    console.note(format!(
+        "Simulating {folder} from cycle {cycle} on: these cycles are flown by nobody, and marked as simulated"
+    ));
     run_to_end(run, console)
 }
 
@@ -74,6 +106,10 @@ fn print_finished(reader: &RunReader, console: Console) -> Result<ExitCode, Fail
 }
 
 fn resume_sweep(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failure> {
+    if args.simulate {
+        let remedy = "leave it out: it is for flights in real time";
+        return Err(InputError::new("--simulate", "this is the folder of a sweep", remedy).into());
+    }
     if args.cycles.is_some() {
         let remedy = "leave --cycles out: the runs of a sweep go to their ends";
         return Err(InputError::new("--cycles", "this is the folder of a sweep", remedy).into());

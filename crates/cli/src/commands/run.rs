@@ -102,6 +102,7 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
         folder: args.out.as_deref(),
         mcap: args.mcap.as_deref().map(|file| (file, args.mcap_every)),
         replace: args.replace,
+        ..OutputPaths::default()
     };
     interrupt::listen()?;
     // An address that cannot be used is refused before anything is written.

@@ -176,3 +176,104 @@ fn an_address_where_no_fleet_flies_is_refused_before_a_page_is_served() {
     assert_eq!((ended.code(), ended.out()), (1, String::new()));
     assert!(ended.err().contains("no answer from tcp/127.0.0.1:9"), "{}", ended.err());
 }
+
+/// Returns the cycles of a run that are on disk for certain.
+fn recorded_cycles(folder: &Path) -> u64 {
+    sidestep_record::RunReader::open(folder).map_or(0, |run| run.manifest.cycles_done)
+}
+
+/// Returns a process that another one has started.
+fn child_process(of: u32) -> u32 {
+    let tasks = std::fs::read_dir(format!("/proc/{of}/task")).expect("a process");
+    let mut children = tasks.filter_map(|task| {
+        let list = std::fs::read_to_string(task.ok()?.path().join("children")).ok()?;
+        list.split_whitespace().next()?.parse().ok()
+    });
+    children.next().expect("the program of fleets")
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn every_command_tells_the_truth_about_a_flight_whose_server_was_killed() {
+    if !is_there() {
+        return;
+    }
+    let place = place();
+    let args = ["fleet", "ring.toml", "--cycles", "100000", "--out", "r", "--set"];
+    let clock = ["airspace.generator.radius_m=1000000", "--clock", "realtime", "--speed", "30"];
+    let fleet = place.start(&[&args[..], &clock[..]].concat());
+    wait_for("cycles on disk", || recorded_cycles(&place.path("r")) >= 10);
+    let server = child_process(fleet.id()).to_string();
+    let killed = std::process::Command::new("kill").args(["-KILL", &server]).status();
+    assert!(killed.expect("kill is there").success());
+    let ended = CommandOutput(fleet.wait_with_output().expect("it ends"));
+    assert_eq!(ended.code(), 1);
+    assert!(ended.err().contains("on disk up to the last second"), "{}", ended.err());
+
+    let done = recorded_cycles(&place.path("r"));
+    let origin = format!("cycles 0 to {} flown", done - 1);
+    assert_eq!(place.run(&["report", "r"]).code(), 0);
+    assert!(place.read("r/report.md").contains(&origin), "{}", place.read("r/report.md"));
+    let exported = place.run(&["export", "r", "--to", "csv"]);
+    assert!(exported.err().contains("under way, or was killed"), "{}", exported.err());
+    let origins = format!("from_cycle,until_cycle,origin\n0,{done},flown\n");
+    assert_eq!(place.read("r-csv/flown-or-simulated.csv"), origins);
+    assert!(place.read("r-csv/trajectories.csv").lines().count() as u64 >= 3 * done);
+    let inspected = place.run(&["inspect", "r"]).out();
+    assert!(inspected.contains(&origin) && inspected.contains("was killed"), "{inspected}");
+
+    for _ in 0..2 {
+        let resumed = place.run(&["resume", "r"]);
+        assert_eq!(resumed.code(), 1, "{}", resumed.err());
+        assert!(resumed.err().contains(&format!("flown until cycle {done}")), "{}", resumed.err());
+    }
+    assert_eq!(place.run(&["report", "r"]).code(), 0);
+    let report = place.read("r/report.md");
+    assert!(report.contains("cut off") && report.contains(&origin), "{report}");
+    let replay = place.run(&["replay", "r"]);
+    assert!(replay.code() == 2 && replay.err().contains("cut off"), "{}", replay.err());
+    assert_eq!(place.run(&["replay", "r", "--cycle", &(done - 1).to_string()]).code(), 0);
+    let json = place.json(&["export", "r", "--to", "csv", "--replace"]);
+    assert_eq!(json["origins"], json!([{ "from": 0, "until": done, "origin": "flown" }]));
+
+    let end = (done + 2).to_string();
+    let simulated = place.run(&["resume", "r", "--simulate", "--cycles", &end]);
+    assert_eq!(simulated.code(), 0, "{}", simulated.err());
+    assert!(simulated.err().contains("marked as simulated"), "{}", simulated.err());
+    let exported = place.run(&["export", "r", "--to", "parquet"]).out();
+    let both = format!("{origin}, cycles {done} to {} simulated", done + 1);
+    assert!(exported.contains(&both), "{exported}");
+}
+
+#[test]
+fn a_flight_of_which_nothing_is_on_disk_is_an_error_and_no_empty_table() {
+    let place = place();
+    let flight = sidestep_record::NewRun {
+        world: "airspace".into(),
+        build: "an earlier one".into(),
+        origin: sidestep_record::Provenance {
+            program_version: "0.1.0".into(),
+            scenario: RING.into(),
+            seed: 5,
+        },
+        cycles_planned: 12,
+        cycle_origin: sidestep_record::CycleOrigin::Flown,
+    };
+    let refuse = sidestep_record::IfExists::Refuse;
+    drop(sidestep_record::RunFolder::create(&place.path("r"), &flight, refuse).expect("created"));
+    for args in [
+        &["report", "r"][..],
+        &["export", "r", "--to", "csv"],
+        &["export", "r", "--to", "gif"],
+        &["replay", "r"],
+    ] {
+        let ended = place.run(args);
+        assert_eq!((ended.code(), ended.out()), (2, String::new()), "{args:?}: {}", ended.err());
+    }
+    assert!(place.run(&["report", "r"]).err().contains("nothing of this run is on disk"));
+    assert!(!place.path("r-csv").exists() && !place.path("r/report.html").exists());
+    let resumed = place.run(&["resume", "r"]);
+    assert_eq!(resumed.code(), 1);
+    assert!(resumed.err().contains("flown until cycle 0 of 12, cut off"), "{}", resumed.err());
+    assert_eq!(place.run(&["resume", "r", "--simulate"]).code(), 2, "of another build");
+}

@@ -28,6 +28,7 @@ use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::view::Frame;
 use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep::worlds::WORLDS;
+use sidestep_record::CycleOrigin;
 use sidestep_session::fleet::{
     CommonSettings, FleetJob, FleetScene, FleetStatus, LinkMessage, NodeJob, NodeStatus,
 };
@@ -57,7 +58,12 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let credentials = credentials(tls, scenario.world.as_ref());
     let wire = ZenohWire::server_wire(&listen, credentials.as_ref()).map_err(endpoint_error)?;
     let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
-    let paths = OutputPaths { folder: job.out.as_deref(), mcap: None, replace: job.replace };
+    let cycle_origin = match job.clock {
+        ClockMode::Lockstep => CycleOrigin::Simulated,
+        ClockMode::Realtime { .. } => CycleOrigin::Flown,
+    };
+    let folder = job.out.as_deref();
+    let paths = OutputPaths { folder, mcap: None, replace: job.replace, cycle_origin };
     // One worker, because the agents' decisions, which take most of the time, are made by the nodes.
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
     print_message(&LinkMessage::Listens(listen.clone()));
@@ -88,7 +94,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     supervisor.children.shut_down();
     let result = result.and_then(|()| supervisor.finish_packets());
     let FleetSupervisor { status, views, .. } = supervisor;
-    let finished = finish(run.into_managed_run(), result, status);
+    let finished = finish(run.into_managed_run(), result, status, job.clock);
     views.wait_for_viewers();
     finished
 }
@@ -121,7 +127,7 @@ fn create_packet_table(
     seed: u64,
 ) -> Result<Option<PacketTable>, RecordError> {
     let folder = job.out.as_ref().filter(|_| job.packets);
-    folder.map(|folder| PacketTable::create(folder, text, seed)).transpose()
+    folder.map(|folder| PacketTable::create(folder, text, seed, job.clock)).transpose()
 }
 
 /// Returns the endpoints at which the server listens, with a port in place of each 0.
@@ -164,6 +170,7 @@ fn finish(
     run: ManagedRun,
     result: Result<(), FleetError>,
     fleet: FleetStatus,
+    clock: ClockMode,
 ) -> Result<(), Error> {
     if let Err(FleetError::World(error)) = result {
         // A recording that has failed would fail again.
@@ -180,6 +187,9 @@ fn finish(
         Err(FleetError::World(error)) => Err(error),
         Err(lost @ FleetError::NodeLost { .. }) => {
             let remedy = match folder {
+                Some(folder) if clock != ClockMode::Lockstep => {
+                    format!("what was flown is kept: `{}`", sidestep_command("report", folder))
+                }
                 Some(folder) => {
                     format!("continue without nodes: `{}`", sidestep_command("resume", folder))
                 }

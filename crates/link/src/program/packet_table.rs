@@ -1,10 +1,11 @@
 //! The table `packets`: every packet that a node has sent.
 
-use crate::protocol::PacketRecord;
+use crate::protocol::{ClockMode, PacketRecord};
 use sidestep::VERSION;
-use sidestep::kernel::EntityId;
 use sidestep::kernel::ports::{RecordError, Recorder, Table};
+use sidestep::kernel::{Cycle, EntityId};
 use sidestep_record::{ParquetRecorder, Provenance};
+use sidestep_session::FlightRecorder;
 use std::path::Path;
 
 /// Number of rows that are written at once: a block of some megabytes, so that Parquet compresses well and the memory of
@@ -16,10 +17,29 @@ type PacketRow = (EntityId, PacketRecord);
 
 /// The table `packets` of a run folder. Until it is finished it is called `packets.partial`.
 pub(super) struct PacketTable {
-    recorder: ParquetRecorder,
+    writer: PacketWriter,
     table: Table<PacketRow>,
     /// Rows that are not written yet.
     rows: Vec<PacketRow>,
+    /// The cycle after the last one of a row.
+    next_cycle: Cycle,
+}
+
+/// The writer of the rows.
+enum PacketWriter {
+    /// In large blocks; a run that was killed is simulated again.
+    Lockstep(ParquetRecorder),
+    /// Within a second, by a thread of its own.
+    Realtime(FlightRecorder),
+}
+
+impl PacketWriter {
+    fn recorder(&mut self) -> &mut dyn Recorder {
+        match self {
+            Self::Lockstep(recorder) => recorder,
+            Self::Realtime(recorder) => recorder,
+        }
+    }
 }
 
 fn packets_table() -> Table<PacketRow> {
@@ -51,12 +71,23 @@ impl PacketTable {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(super) fn create(folder: &Path, scenario: &str, seed: u64) -> Result<Self, RecordError> {
+    pub(super) fn create(
+        folder: &Path,
+        scenario: &str,
+        seed: u64,
+        clock: ClockMode,
+    ) -> Result<Self, RecordError> {
         let table = packets_table();
         let provenance =
             Provenance { program_version: VERSION.into(), scenario: scenario.into(), seed };
         let recorder = ParquetRecorder::create(folder, &[table.schema()], &provenance)?;
-        Ok(Self { recorder, table, rows: Vec::new() })
+        let writer = match clock {
+            ClockMode::Lockstep => PacketWriter::Lockstep(recorder),
+            ClockMode::Realtime { .. } => {
+                PacketWriter::Realtime(FlightRecorder::start(recorder, None))
+            }
+        };
+        Ok(Self { writer, table, rows: Vec::new(), next_cycle: 0 })
     }
 
     /// Adds packets of cycles that will get no further ones.
@@ -66,17 +97,23 @@ impl PacketTable {
     pub(super) fn add(&mut self, mut rows: Vec<PacketRow>) -> Result<(), RecordError> {
         // Nodes report in any order; the file of two equal runs is the same.
         rows.sort_unstable_by_key(|(sender, packet)| (packet.cycle, *sender, *packet));
+        let last_cycle = rows.last().map_or(0, |(_, packet)| packet.cycle);
+        self.next_cycle = self.next_cycle.max(last_cycle + 1);
         self.rows.append(&mut rows);
-        if self.rows.len() < BLOCK_ROWS {
-            return Ok(());
+        let is_flown = matches!(self.writer, PacketWriter::Realtime(_));
+        if is_flown || self.rows.len() >= BLOCK_ROWS {
+            self.write_block()?;
         }
-        self.write_block()
+        match &mut self.writer {
+            PacketWriter::Lockstep(_) => Ok(()),
+            PacketWriter::Realtime(recorder) => recorder.seal_if_due(self.next_cycle, false),
+        }
     }
 
     fn write_block(&mut self) -> Result<(), RecordError> {
         let block = self.table.block_from_rows(&self.rows);
         self.rows.clear();
-        self.recorder.append(0, &block)
+        self.writer.recorder().append(0, &block)
     }
 
     /// Completes the table.
@@ -85,6 +122,6 @@ impl PacketTable {
     /// When the last rows cannot be written.
     pub(super) fn finish(mut self) -> Result<(), RecordError> {
         self.write_block()?;
-        self.recorder.finish()
+        self.writer.recorder().finish()
     }
 }

@@ -6,6 +6,7 @@ mod chains;
 mod clocks;
 mod cuts;
 mod faults;
+mod flights;
 mod input;
 mod namespaces;
 mod output;

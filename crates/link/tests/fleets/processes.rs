@@ -258,21 +258,26 @@ fn a_fleet_whose_starter_is_gone_ends_in_good_order_and_leaves_no_process() {
 
 /// The server is killed, and its nodes end although nothing ends them; the folder is not lost.
 #[test]
-fn nodes_of_a_server_that_is_killed_end_by_themselves_and_the_folder_resumes() {
-    let text = wide(&superconflict(4, "compact-team", 200, ""), 8_000)
+fn nodes_of_a_server_that_is_killed_end_by_themselves_and_a_run_in_lockstep_resumes() {
+    let text = wide(&superconflict(4, "compact-team", 2_000, ""), 8_000)
         + "[record]\ncheckpoint_every = 5\n";
     let folder = folder(&text);
     let out = folder.path().join("run");
-    let slow = ClockMode::Realtime { speed: 100.0 };
-    let job = FleetJob { out: Some(out.clone()), ..job(folder.path(), Topology::Mesh, slow) };
+    let common = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
+    let job = FleetJob { out: Some(out.clone()), ..common };
     let mut program = LinkProcess::start(&Job::Fleet(job));
     let fleet = program.fleet("some cycles", |now| now.cycle > 10);
     program.child.kill().expect("killed");
     wait_until_gone(&fleet, Duration::from_secs(10));
     let journey = ManagedRun::resume(&WORLDS, &out, 1, None).expect("it can be resumed");
     assert!(journey.cycle() >= 5);
-    let summary = journey.run_to_end(&NoWatcher).expect("flown to the end");
+    let summary = journey.run_to_end(&NoWatcher).expect("computed to the end");
     assert_eq!(summary.status, RunStatus::Complete);
+    // It was computed in any case, so its digest is that of a run in one process.
+    assert_eq!(summary.digest, run_in_one_process(&text).digest);
+    let manifest = sidestep_record::RunReader::open(&out).expect("a run").manifest;
+    assert!(!manifest.is_flight());
+    assert_eq!(manifest.origins[0].until, summary.cycles);
 }
 
 #[test]

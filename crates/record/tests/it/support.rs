@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, ColumnValues, TableSchema};
-use sidestep_record::{NewRun, ParquetRecorder, Provenance};
+use sidestep_record::{CycleOrigin, NewRun, ParquetRecorder, Provenance};
 
 /// A column without a meaning.
 pub(crate) fn column(name: &str, ty: ColumnType, labels: &[&str]) -> ColumnSpec {
@@ -58,6 +58,7 @@ pub(crate) fn new_run() -> NewRun {
         build: "0.1.0+a".into(),
         origin: origin(),
         cycles_planned: 100,
+        cycle_origin: CycleOrigin::Simulated,
     }
 }
 

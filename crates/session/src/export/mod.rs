@@ -96,6 +96,7 @@ pub fn export(
     wanted: &ExportRequest<'_>,
     watcher: &dyn Watcher,
 ) -> Result<ExportResult, Error> {
+    recorded.check_has_content()?;
     let job = ExportContext {
         recorded,
         wanted,

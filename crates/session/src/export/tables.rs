@@ -7,12 +7,16 @@ use csv::ByteRecord;
 use sidestep_kernel::ports::{ColumnValues, TableSchema};
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{Table, TableFileWriter, for_each_block, tables};
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Name of the table of which every row is kept, regardless of `every`.
 const EVENTS: &str = "events";
+
+/// File beside the tables of a flight: which cycles were flown, and which simulated.
+const ORIGINS_FILE: &str = "flown-or-simulated.csv";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TableFormat {
@@ -40,14 +44,16 @@ pub(super) fn export(
         }
         None => {
             let names = tables(source.folder)?;
-            let target = Target::for_folder(job, &format!("-{ending}"), &[ending])?;
+            let target = Target::for_folder(job, &format!("-{ending}"), &[ending, "csv"])?;
             target.write_folder(|partial| {
                 for name in &names {
                     source.write(name, &partial.join(format!("{name}.{ending}")))?;
                 }
-                Ok(())
+                source.write_origins(&partial.join(ORIGINS_FILE))
             })?;
-            names.iter().map(|name| target.path().join(format!("{name}.{ending}"))).collect()
+            let files = names.iter().map(|name| format!("{name}.{ending}"));
+            let origins = job.recorded.is_flight.then(|| ORIGINS_FILE.to_string());
+            files.chain(origins).map(|file| target.path().join(file)).collect()
         }
     };
     Ok(ExportResult { paths, is_confirmed: false, film: None })
@@ -89,6 +95,19 @@ impl<'a> TableExport<'a> {
             TableFormat::Csv => self.write_csv(name, to),
             TableFormat::Parquet => self.write_parquet(name, to),
         }
+    }
+
+    /// Writes which cycles of a flight were flown, and which simulated; nothing for other runs, all of which are simulated.
+    fn write_origins(&self, to: &Path) -> Result<(), Error> {
+        let recorded = self.job.recorded;
+        if !recorded.is_flight {
+            return Ok(());
+        }
+        let mut text = "from_cycle,until_cycle,origin\n".to_string();
+        for range in &recorded.origins {
+            let _ = writeln!(text, "{},{},{}", range.from, range.until, range.origin.name());
+        }
+        std::fs::write(to, text).map_err(|e| Error::cannot_write(to, &e))
     }
 
     /// Passes on the requested rows, block by block.

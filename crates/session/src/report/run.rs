@@ -3,13 +3,15 @@
 
 use super::text::{format_count, format_duration};
 use super::{events, metrics, tables};
+use crate::flight::cut_off_text;
 use crate::read_summary;
+use crate::recorded_run::nothing_recorded;
 use serde_json::Value;
 use sidestep_document::Document;
 use sidestep_document::document::{Block, Code, Picture, Text};
 use sidestep_kernel::InputError;
 use sidestep_kernel::shell::sidestep_command;
-use sidestep_record::{Manifest, RunReader, Status};
+use sidestep_record::{Manifest, RunReader, Status, origins_text};
 use sidestep_scenario::{MetricInfo, Worlds};
 use std::path::Path;
 
@@ -25,6 +27,7 @@ pub(super) fn document(worlds: &Worlds, folder: &Path) -> Result<Document, Input
     let view = RunReader::open(folder)?;
     view.check_files(|_| true)?;
     let summary = read_summary(folder)?;
+    refuse_nothing(&view)?;
     let name = name(&view, summary.as_ref());
     let mut document = Document::new(format!("{name}, seed {}", view.manifest.seed), lead(&view));
     if let Some(warning) = unfinished(&view) {
@@ -52,6 +55,17 @@ pub(super) fn document(worlds: &Worlds, folder: &Path) -> Result<Document, Input
     Ok(document)
 }
 
+/// Refuses a run of which nothing is on disk: a report of it would look as if nothing had happened in it.
+fn refuse_nothing(view: &RunReader) -> Result<(), InputError> {
+    let Manifest { status, cycles_done, .. } = &view.manifest;
+    let is_flight = view.manifest.is_flight();
+    let is_begun = *status == Status::Complete || *cycles_done > 0;
+    if is_begun || !(is_flight || tables::table_names(&view.path)?.is_empty()) {
+        return Ok(());
+    }
+    Err(nothing_recorded(&view.path, is_flight))
+}
+
 /// Returns the scenario's name, or the world's if it has none.
 fn name(view: &RunReader, summary: Option<&Value>) -> String {
     let named = summary.and_then(|s| s.get("name")).and_then(Value::as_str);
@@ -76,7 +90,10 @@ fn lead(view: &RunReader) -> Text {
 
 /// Returns a remark about a run that is not complete.
 fn unfinished(view: &RunReader) -> Option<Text> {
-    let Manifest { status, cycles_done, .. } = &view.manifest;
+    let Manifest { status, cycles_done, cycles_planned, .. } = &view.manifest;
+    if view.manifest.ends_in_flight() && *status != Status::Complete {
+        return Some(unfinished_flight(&view.manifest, *cycles_done, *cycles_planned));
+    }
     let how = match status {
         Status::Complete => return None,
         Status::Incomplete => "It was stopped",
@@ -90,18 +107,34 @@ fn unfinished(view: &RunReader) -> Option<Text> {
     Some(Text::from_markup(&text).append(resume).append(" continues it."))
 }
 
+/// Returns the remark about a flight that did not reach its end.
+fn unfinished_flight(manifest: &Manifest, done: u64, planned: u64) -> Text {
+    let end = if manifest.is_cut_off {
+        cut_off_text(done, planned)
+    } else {
+        format!("it is under way, or was killed; recorded are its first {done} cycles of {planned}")
+    };
+    Text::from_markup(&format!("**This flight in real time is not complete**: {end}."))
+}
+
 fn facts(view: &RunReader, summary: Option<&Value>) -> Vec<(String, Text)> {
     let manifest = &view.manifest;
     let status = match manifest.status {
         Status::Complete => "complete",
+        Status::Incomplete if manifest.is_cut_off => "cut off",
         Status::Incomplete => "incomplete",
         Status::Running => "not ended",
+    };
+    let origins = match &*manifest.all_origins() {
+        [] => "none".to_string(),
+        origins => origins_text(origins),
     };
     let mut facts: Vec<(String, Text)> = vec![
         ("World".into(), Text::code(&*manifest.world)),
         ("Status".into(), status.into()),
         ("Seed".into(), manifest.seed.to_string().into()),
         ("Cycles".into(), format_count(manifest.cycles_done).into()),
+        ("Flown or simulated".into(), origins.into()),
         ("Cycles planned".into(), format_count(manifest.cycles_planned).into()),
         ("Version".into(), format!("sidestep {}", manifest.program_version).into()),
     ];

@@ -2,14 +2,14 @@
 
 use super::executor::{Engine, TrialBatch, TrialExecutor};
 use crate::managed_run::record_to_end;
-use crate::run_recorder::RunRecorder;
+use crate::run_recorder::{RecordingPlan, RunRecorder};
 use crate::watcher::{NestedWatcher, Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use serde_json::json;
 use sidestep_experiment::sweep::scheduler::{self, run_trials};
 use sidestep_experiment::sweep::{Outcome, Trial, start_trial};
 use sidestep_kernel::InputError;
-use sidestep_record::IfExists;
+use sidestep_record::{CycleOrigin, IfExists};
 use sidestep_scenario::{Source, Worlds};
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -175,10 +175,13 @@ impl RecordedTrial<'_> {
         // The run is of the text in its folder, so that it can be computed again from there.
         let in_folder = Source::new("scenario.toml", &*resolved.text, folder);
         let mut run = compiled.start(&in_folder, workers);
-        let existing = IfExists::Replace;
+        let plan = RecordingPlan {
+            existing: IfExists::Replace,
+            build: worlds.build(),
+            cycle_origin: CycleOrigin::Simulated,
+        };
         let recording =
-            RunRecorder::create(folder, &resolved, run.as_mut(), existing, worlds.build())
-                .map_err(folder_error)?;
+            RunRecorder::create(folder, &resolved, run.as_mut(), plan).map_err(folder_error)?;
         let compiled_at = Instant::now();
         let is_complete = record_to_end(run.as_mut(), recording, workers, &NestedWatcher(watcher))?;
         if !is_complete {

@@ -5,7 +5,8 @@ use sidestep_session::{Error, NoWatcher, OutputPaths};
 use std::path::Path;
 
 fn start(place: &TestFolder, folder: &Path, mcap: &Path) -> Result<(), Error> {
-    let keep = OutputPaths { folder: Some(folder), mcap: Some((mcap, 100)), replace: false };
+    let keep =
+        OutputPaths { folder: Some(folder), mcap: Some((mcap, 100)), ..OutputPaths::default() };
     place.start(1, keep)?.run_to_end(&NoWatcher).map(drop)
 }
 
