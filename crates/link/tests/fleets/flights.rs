@@ -25,12 +25,12 @@ struct Flight {
 
 impl Flight {
     /// Starts a flight of 4 airplanes that would last for an hour.
-    fn start(packets: bool) -> Self {
+    fn start() -> Self {
         let folder = folder(&wide(&superconflict(4, "compact-team", 100_000, ""), 1_000_000));
         let out = folder.path().join("run");
         let clock = ClockMode::Realtime { speed: 30.0 };
         let common = job(folder.path(), Topology::Mesh, clock);
-        let job = FleetJob { out: Some(out.clone()), packets, ..common };
+        let job = FleetJob { out: Some(out.clone()), ..common };
         Self { program: LinkProcess::start(&Job::Fleet(job)), out, _folder: folder }
     }
 
@@ -106,12 +106,11 @@ fn check_killed_flight(out: &Path, at_least: Cycle) -> Cycle {
 
 #[test]
 fn a_flight_whose_server_is_killed_is_on_disk_and_is_continued_only_if_asked_for() {
-    let mut flight = Flight::start(true);
+    let mut flight = Flight::start();
     let fleet = flight.wait_until_recorded(20);
     flight.program.child.kill().expect("killed");
     flight.program.child.wait().expect("ended");
     wait_until_gone(&fleet, TIMEOUT);
-    assert!(last_cycle(&flight.out, "packets").is_some(), "of packets too");
     let done = check_killed_flight(&flight.out, 20);
 
     // What is simulated from there is marked, also when it stops again and is resumed.
@@ -134,7 +133,7 @@ fn a_flight_whose_server_is_killed_is_on_disk_and_is_continued_only_if_asked_for
 
 #[test]
 fn a_flight_of_which_all_processes_are_killed_is_on_disk() {
-    let mut flight = Flight::start(false);
+    let mut flight = Flight::start();
     let fleet = flight.wait_until_recorded(20);
     for node in fleet.nodes.iter().filter_map(|node| node.process) {
         let _ = try_signal(node, "KILL");
@@ -146,7 +145,7 @@ fn a_flight_of_which_all_processes_are_killed_is_on_disk() {
 
 #[test]
 fn a_flight_goes_on_without_a_node_that_is_killed_and_its_end_is_known_when_it_is_ended() {
-    let mut flight = Flight::start(false);
+    let mut flight = Flight::start();
     let fleet = flight.wait_until_recorded(5);
     signal(fleet.nodes[2].process.expect("a process"), "KILL");
     let later = flight.manifest().cycles_done + 10;
