@@ -197,7 +197,7 @@ impl TableWriter {
         for (column, values) in growing.columns.iter_mut().zip(block) {
             column.append(values);
         }
-        growing.has_unsealed |= block.first().is_some_and(|values| values.len() > 0);
+        growing.has_unsealed |= block.first().is_some_and(|values| !values.is_empty());
         Ok(())
     }
 
