@@ -21,6 +21,7 @@ mod ik;
 mod ik_poses;
 mod input;
 mod inspect;
+mod kills;
 mod learn;
 mod names;
 mod output;

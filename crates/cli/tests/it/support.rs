@@ -145,6 +145,37 @@ pub(crate) fn wait_for(what: &str, ready: impl Fn() -> bool) {
     }
 }
 
+/// Returns the number of processes that a test kills: `default`, or as many as `.ci/soak` asks for.
+pub(crate) fn kill_count(default: usize) -> usize {
+    let asked = std::env::var("SIDESTEP_SOAK_KILLS");
+    asked.map_or(default, |text| text.parse().expect("SIDESTEP_SOAK_KILLS is a number"))
+}
+
+/// The same numbers in every run of the tests, spread over 0 to 1.
+pub(crate) fn fractions() -> impl Iterator<Item = f64> {
+    let next = |x: &u64| Some(x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1));
+    let states = std::iter::successors(Some(1u64), next).skip(1);
+    states.map(|x| (x >> 11) as f64 / (1u64 << 53) as f64)
+}
+
+/// Waits until `ready`, or until the process is over; whether it still runs then.
+pub(crate) fn runs_until(child: &mut Child, mut ready: impl FnMut() -> bool) -> bool {
+    loop {
+        if child.try_wait().expect("a child of ours").is_some() {
+            return false;
+        }
+        if ready() {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Kills a process, unless it has ended.
+pub(crate) fn try_kill(process: u32) {
+    let _ = Command::new("kill").args(["-KILL", &process.to_string()]).output();
+}
+
 /// Sends a signal, as a terminal would.
 pub(crate) fn signal(child: &Child, name: &str) {
     let pid = child.id().to_string();

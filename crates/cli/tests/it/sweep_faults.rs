@@ -1,11 +1,10 @@
 //! E1 for sweeps: partial output is never taken for whole. No kill loses a finished run, and none
 //! is made twice; a full disk stops the sweep, and it goes on when there is room.
 
-use crate::support::{SmallDisk, TestFolder, signal, wait_for};
+use crate::support::{SmallDisk, TestFolder, fractions, kill_count, runs_until, signal, wait_for};
 use crate::sweep::place;
 use std::collections::BTreeSet;
-use std::process::Child;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Lines of the journal that are whole; the first is its head.
 fn finished(place: &TestFolder, folder: &str) -> Vec<String> {
@@ -18,26 +17,6 @@ fn finished(place: &TestFolder, folder: &str) -> Vec<String> {
 fn cell(line: &str) -> u64 {
     let row: serde_json::Value = serde_json::from_str(&line[9..]).expect("a whole line is JSON");
     row["cell"].as_u64().expect("a number")
-}
-
-/// The same numbers in every run of the tests, spread over 0 to 1.
-fn fractions() -> impl Iterator<Item = f64> {
-    let next = |x: &u64| Some(x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1));
-    let states = std::iter::successors(Some(1u64), next).skip(1);
-    states.map(|x| (x >> 11) as f64 / (1u64 << 53) as f64)
-}
-
-/// Waits until `ready`, or until the process is over; whether it still runs then.
-fn runs_until(child: &mut Child, mut ready: impl FnMut() -> bool) -> bool {
-    loop {
-        if child.try_wait().expect("a child of ours").is_some() {
-            return false;
-        }
-        if ready() {
-            return true;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
 }
 
 #[test]
@@ -59,7 +38,7 @@ fn fifty_kills_at_any_time_lose_no_finished_run_and_repeat_none() {
     let (mut kills, mut broken) = (0, 0);
     let mut fractions = fractions();
     for k in 0.. {
-        if kills >= 50 {
+        if kills >= kill_count(50) {
             break;
         }
         let folder = format!("d{k}");
