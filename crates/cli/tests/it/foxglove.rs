@@ -55,8 +55,10 @@ impl Viewer {
         let (channels, kept) = (BTreeMap::new(), Vec::new());
         let mut viewer = Self { socket, info: Value::Null, channels, kept };
         while viewer.channels.is_empty() {
-            let text = viewer.read().into_text().expect("text first");
-            viewer.note(serde_json::from_str(&text).expect("JSON"));
+            // The time may come before the channels: it is binary, and nobody has asked for anything yet.
+            if let Message::Text(text) = viewer.read() {
+                viewer.note(serde_json::from_str(&text).expect("JSON"));
+            }
         }
         viewer
     }
