@@ -39,6 +39,10 @@ pub(crate) struct LinkArgs {
     #[arg(long)]
     log_json: bool,
 
+    /// Allow links that leave this machine without certificates: whoever reaches them can take part, read and change
+    #[arg(long, conflicts_with = "tls_ca", help_heading = "Encryption")]
+    insecure: bool,
+
     #[command(flatten)]
     tls: TlsArgs,
 }
@@ -71,6 +75,7 @@ impl LinkArgs {
         CommonSettings {
             flown: JobScenario { file, overrides, build },
             tls: self.tls.files(),
+            is_insecure: self.insecure,
             lease_s: self.lease,
             metrics: self.metrics.clone(),
             json_log: self.log_json,

@@ -150,7 +150,15 @@ fn job(folder: &Path, clock: ClockMode) -> FleetJob {
     let flown = JobScenario { file: folder.join("s.toml"), overrides: Vec::new(), build };
     let (tls, metrics, log) = (None, None, "error".to_string());
     FleetJob {
-        common: CommonSettings { flown, tls, lease_s: 30.0, metrics, json_log: false, log },
+        common: CommonSettings {
+            flown,
+            tls,
+            is_insecure: false,
+            lease_s: 30.0,
+            metrics,
+            json_log: false,
+            log,
+        },
         nodes: None,
         clock,
         topology: Topology::Mesh,

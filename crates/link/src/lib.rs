@@ -12,6 +12,7 @@
 //! worlds.rs          the worlds that have it: airspace.rs (pilots), chain.rs (connectors)
 //! faults.rs          the faults of the scenario's network, for the packets of one agent
 //! recent_senders.rs  the senders that an agent has heard lately
+//! replay_window.rs   which frames of a peer have arrived
 //! hosted_run.rs      the recorded run at the server
 //! server/            the server of the world
 //! node/              the node of an agent
@@ -32,6 +33,7 @@ pub mod peer;
 pub mod program;
 pub mod protocol;
 mod recent_senders;
+mod replay_window;
 pub mod server;
 pub mod wire;
 pub mod worlds;

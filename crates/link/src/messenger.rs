@@ -2,6 +2,7 @@
 
 use crate::arq::ArqLink;
 use crate::protocol::{FleetMember, Incarnation, Message, RecipientHeader, TransportFrame};
+use crate::replay_window::ReplayWindow;
 use crate::wire::{PeerId, Wire, WireSetupError};
 use sidestep::kernel::EntityId;
 use std::collections::BTreeMap;
@@ -32,6 +33,8 @@ mod drop_reason {
     pub(super) const STRANGER: &str = "stranger";
     /// Its sender is not who it says.
     pub(super) const FORGED: &str = "forged";
+    /// The same frame has arrived before, or so many later ones have that nobody can tell.
+    pub(super) const REPEATED: &str = "repeated";
     /// The message is a duplicate, or one before it is missing.
     pub(super) const OUT_OF_ORDER: &str = "out-of-order";
 }
@@ -54,6 +57,8 @@ pub struct MessengerStats {
 struct PeerState {
     incarnation: Incarnation,
     link: ArqLink,
+    /// Its frames that have arrived.
+    arrived: Box<ReplayWindow>,
     /// Time at which it was last heard, or connected; later by the absences of this messenger since.
     last_heard: Duration,
 }
@@ -85,6 +90,8 @@ pub struct ReceivedMessage {
 pub struct Messenger {
     me: PeerId,
     incarnation: Incarnation,
+    /// Number of the next frame.
+    next_number: u64,
     wire: Box<dyn Wire>,
     clock: Clock,
     /// Time at which it last listened.
@@ -101,6 +108,7 @@ impl Messenger {
         Self {
             me,
             incarnation: new_incarnation(),
+            next_number: 0,
             wire,
             clock: Box::new(move || started.elapsed()),
             listened_at: Duration::ZERO,
@@ -135,7 +143,12 @@ impl Messenger {
             self.peers.get(&peer).is_some_and(|state| state.incarnation == incarnation);
         if !is_connected {
             let last_heard = self.now();
-            let state = PeerState { incarnation, link: ArqLink::default(), last_heard };
+            let state = PeerState {
+                incarnation,
+                link: ArqLink::default(),
+                arrived: Box::default(),
+                last_heard,
+            };
             self.peers.insert(peer, state);
         }
     }
@@ -226,8 +239,11 @@ impl Messenger {
             return;
         }
         let peers: Vec<PeerId> = to.iter().map(|recipient| recipient.peer).collect();
-        let frame =
-            TransportFrame { from: self.me, incarnation: self.incarnation, to, message }.encode();
+        let number = self.next_number;
+        self.next_number += 1;
+        let from = self.me;
+        let incarnation = self.incarnation;
+        let frame = TransportFrame { from, incarnation, number, to, message }.encode();
         self.stats.frames += 1;
         self.stats.bytes += frame.len() as u64;
         self.wire.send(&peers, &frame);
@@ -246,6 +262,16 @@ impl Messenger {
 
     fn count_drop(&mut self, reason: &'static str) {
         *self.stats.dropped.entry(reason).or_default() += 1;
+    }
+
+    /// Counts a frame that no peer has sent in this form. Of many, only the first and each doubling is told: somebody could
+    /// else fill the log.
+    fn count_bad_frame(&mut self, reason: &'static str) {
+        self.count_drop(reason);
+        let count = self.stats.dropped[reason];
+        if count.is_power_of_two() {
+            tracing::warn!(me = %self.me, reason, count, "frames are dropped: they were changed or repeated on the way");
+        }
     }
 
     /// Sends the frames that are due: retransmissions and acknowledgments.
@@ -339,11 +365,11 @@ impl Messenger {
         let frame = match TransportFrame::decode(bytes) {
             Ok(frame) => frame,
             Err(reason) => {
-                self.count_drop(reason.name());
+                self.count_bad_frame(reason.name());
                 return None;
             }
         };
-        let TransportFrame { from, incarnation, to, message } = frame;
+        let TransportFrame { from, incarnation, number, to, message } = frame;
         // A frame for most nodes is published to all of them, so some frames are not for this peer.
         let recipient = to.into_iter().find(|recipient| recipient.peer == self.me)?;
         // A frame to the process that was here before has sequence numbers that mean nothing to this one.
@@ -351,11 +377,22 @@ impl Messenger {
             self.count_drop(drop_reason::FORMER_LIFE);
             return None;
         }
+        if !self.is_new(from, incarnation, number) {
+            self.count_bad_frame(drop_reason::REPEATED);
+            return None;
+        }
         if let Err(reason) = self.process_header(from, incarnation, &recipient) {
             self.count_drop(reason);
             return None;
         }
         Some(ReceivedMessage { from, incarnation, message: message? })
+    }
+
+    /// Records the arrival of a frame, and returns whether it is new. Of peers that are not connected all are: what they may
+    /// send does no harm if it comes twice.
+    fn is_new(&mut self, from: PeerId, incarnation: Incarnation, number: u64) -> bool {
+        let state = self.peers.get_mut(&from).filter(|state| state.incarnation == incarnation);
+        state.is_none_or(|state| state.arrived.record(number))
     }
 
     /// Processes the acknowledgment and the sequence number of a frame; an error is the reason why its message is dropped.
@@ -396,6 +433,7 @@ fn new_incarnation() -> Incarnation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::DecodeError;
     use crate::wire::memory::MemoryHub;
     use std::sync::Mutex;
 
@@ -540,6 +578,41 @@ mod tests {
             assert_eq!(messenger.receive(Duration::ZERO), None);
             assert_eq!(messenger.silent_for(peer), Some(Duration::ZERO));
         }
+    }
+
+    #[test]
+    fn frames_that_are_repeated_or_changed_on_the_way_are_dropped_counted_and_do_no_harm() {
+        let hub = MemoryHub::default();
+        let (a, b) = (PeerId::Server, PeerId::Node(3));
+        let (mut first, mut second) = (messenger(&hub, a, 0), messenger(&hub, b, 0));
+        let mut on_the_way = hub.open_wire(PeerId::Node(4));
+        first.connect(b, second.incarnation());
+        second.connect(a, first.incarnation());
+        // What somebody between the two sees.
+        first.wire = Box::new(hub.open_wire(a));
+        let mut frames = Vec::new();
+        for message in [Message::Heartbeat, Message::Hello] {
+            let header = first.peers.get_mut(&b).expect("connected").recipient_header(b, None);
+            let frame = TransportFrame {
+                from: a,
+                incarnation: first.incarnation(),
+                number: frames.len() as u64,
+                to: vec![header],
+                message: Some(message),
+            };
+            frames.push(frame.encode());
+        }
+        for frame in [&frames[1], &frames[0], &frames[1], &frames[0]] {
+            on_the_way.send(&[b], frame);
+        }
+        let mut flipped = frames[0].clone();
+        flipped[5] ^= 4;
+        on_the_way.send(&[b], &flipped);
+        let received = [second.receive(SOON), second.receive(SOON), second.receive(SOON)];
+        let messages = received.map(|received| received.map(|received| received.message));
+        assert_eq!(messages, [Some(Message::Hello), Some(Message::Heartbeat), None]);
+        let dropped = &second.stats().dropped;
+        assert_eq!((dropped[drop_reason::REPEATED], dropped[DecodeError::Damaged.name()]), (2, 1));
     }
 
     #[test]

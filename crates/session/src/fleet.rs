@@ -77,6 +77,8 @@ pub struct CommonSettings {
     pub flown: JobScenario,
     /// Certificates, where links are encrypted and both ends prove their identity.
     pub tls: Option<Tls>,
+    /// Whether links without certificates may leave this machine.
+    pub is_insecure: bool,
     /// Time in seconds after which a party that is not heard counts as gone.
     pub lease_s: f64,
     /// The address at which it serves its metrics, as `HOST:PORT`.

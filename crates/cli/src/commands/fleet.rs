@@ -20,7 +20,7 @@ Examples:
   sidestep fleet ring.toml --clock realtime --listen tcp/127.0.0.1:7600
                                            and sidestep studio tcp/127.0.0.1:7600
                                            shows it
-  sidestep fleet ring.toml --nodes 0 --listen tcp/10.0.0.1:7600
+  sidestep fleet ring.toml --nodes 0 --listen tcp/10.0.0.1:7600 --insecure
                                            the airplanes are elsewhere: see
                                            sidestep node --help
   sidestep fleet chain.toml --set chain.deployment=team

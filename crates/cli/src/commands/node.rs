@@ -12,13 +12,14 @@ use sidestep_session::fleet::{AgentName, Job, NodeJob};
 const EXAMPLES: &str = "\
 Examples:
   sidestep node ring.toml --airplane 3 --connect tcp/10.0.0.1:7600 \\
-      --listen tcp/10.0.0.4:0
-  sidestep node ring.toml --airplane 3 --connect tcp/10.0.0.1:7600
+      --listen tcp/10.0.0.4:0 --insecure
+  sidestep node ring.toml --airplane 3 --connect tcp/10.0.0.1:7600 --insecure
                                    for a fleet with --topology star
   sidestep node chain.toml --connector 0.3 --connect tcp/10.0.0.1:7600 \\
-      --listen tcp/10.0.0.4:0      connector 3 of chain 0
+      --listen tcp/10.0.0.4:0 --insecure
+                                   connector 3 of chain 0
 
-Give it the scenario, --set, --seed and --cycles of the fleet. It runs its agent until the fleet \
+Give it the scenario, --set, --seed and --cycles of the fleet, and on a network that you do not trust certificates in place of --insecure. It runs its agent until the fleet \
 ends. When it has not heard the server for the time of --lease, it ends in lockstep; in real time \
 it waits for another minute, and takes its place again when the server is back.";
 

@@ -13,21 +13,40 @@ use rustls::server::WebPkiClientVerifier;
 use rustls::sign::CertifiedKey;
 use rustls::{CertificateError, Error, InconsistentKeys, RootCertStore};
 use sidestep::kernel::{EntityId, InputError};
-use sidestep_session::fleet::Tls;
+use sidestep_session::fleet::{CommonSettings, Tls, WatchJob};
+use std::net::IpAddr;
 use std::path::Path;
 use std::sync::Arc;
 use x509_parser::pem::Pem;
 
-/// Checks certificates, and that endpoints are encrypted if and only if there are certificates.
+/// Checks certificates, and that endpoints are encrypted if and only if there are certificates; without them they must be
+/// of this machine alone, unless the user said that the network is trusted.
 ///
 /// # Errors
 /// With the first thing that is wrong.
 pub(super) fn check_encryption<'a>(
     endpoints: impl IntoIterator<Item = &'a String>,
-    tls: Option<&Tls>,
+    common: &CommonSettings,
 ) -> Result<(), InputError> {
+    let tls = common.tls.as_ref();
     tls.map_or(Ok(()), check_certificates)?;
-    check_endpoint_encryption(endpoints, tls)
+    for endpoint in endpoints {
+        check_endpoint_encryption(endpoint, tls)?;
+        if tls.is_none() && !common.is_insecure {
+            check_is_of_this_machine(endpoint)?;
+        }
+    }
+    Ok(())
+}
+
+/// Checks the endpoint of a viewer, which only asks for pictures.
+///
+/// # Errors
+/// With the first thing that is wrong.
+pub(super) fn check_viewer_encryption(job: &WatchJob) -> Result<(), InputError> {
+    let tls = job.tls.as_ref();
+    tls.map_or(Ok(()), check_certificates)?;
+    job.connect.iter().try_for_each(|endpoint| check_endpoint_encryption(endpoint, tls))
 }
 
 /// Checks that a party may be who it is to be by its certificate.
@@ -204,22 +223,33 @@ fn provider() -> Arc<CryptoProvider> {
 ///
 /// # Errors
 /// With the first endpoint for which that is not so.
-fn check_endpoint_encryption<'a>(
-    endpoints: impl IntoIterator<Item = &'a String>,
-    tls: Option<&Tls>,
-) -> Result<(), InputError> {
-    for endpoint in endpoints {
-        if tls.is_none() && endpoint.starts_with("tls/") {
-            let cause = "links to it are encrypted, and there is no certificate to show";
-            let remedy = "give --tls-ca, --tls-cert and --tls-key, or tcp/HOST:PORT";
-            return Err(InputError::new(endpoint, cause, remedy));
-        }
-        if tls.is_some() && endpoint.starts_with("tcp/") {
-            let cause = "links to it are not encrypted, although there are certificates";
-            return Err(InputError::new(endpoint, cause, "write it as tls/HOST:PORT"));
-        }
+fn check_endpoint_encryption(endpoint: &str, tls: Option<&Tls>) -> Result<(), InputError> {
+    if tls.is_none() && endpoint.starts_with("tls/") {
+        let cause = "links to it are encrypted, and there is no certificate to show";
+        let remedy = "give --tls-ca, --tls-cert and --tls-key, or tcp/HOST:PORT";
+        return Err(InputError::new(endpoint, cause, remedy));
+    }
+    if tls.is_some() && endpoint.starts_with("tcp/") {
+        let cause = "links to it are not encrypted, although there are certificates";
+        return Err(InputError::new(endpoint, cause, "write it as tls/HOST:PORT"));
     }
     Ok(())
+}
+
+/// Refuses an endpoint that others than the programs of this machine can reach. A text that is none has an error of its
+/// own.
+fn check_is_of_this_machine(endpoint: &str) -> Result<(), InputError> {
+    let Ok((host, _)) = host_and_port(endpoint) else { return Ok(()) };
+    let address = bare_host(host).parse::<IpAddr>();
+    if host == "localhost" || address.is_ok_and(|address| address.is_loopback()) {
+        return Ok(());
+    }
+    let cause = "it is not of this machine alone, and without certificates whoever reaches it can take part in the fleet, \
+                 and read and change all that is sent";
+    let remedy = "give --tls-ca, --tls-cert and --tls-key with tls/HOST:PORT (the chapter \"Who may do what in a fleet\" of \
+                  the book has the commands that make certificates), an address as tcp/127.0.0.1:7600, or, on a network \
+                  that you trust, --insecure";
+    Err(InputError::new(endpoint, cause, remedy))
 }
 
 fn read_tls_file(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {

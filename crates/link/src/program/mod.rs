@@ -102,7 +102,7 @@ fn run_job(job: Job) -> Result<(), Error> {
         }
         Job::Watch(job) => {
             check_build(&job.build)?;
-            certificates::check_encryption(&job.connect, job.tls.as_ref())?;
+            certificates::check_viewer_encryption(&job)?;
             certificates::check_identity(
                 job.tls.as_ref(),
                 |name| matches!(name, CertificateName::Viewer | CertificateName::Server),
@@ -120,7 +120,7 @@ fn apply_common_settings<'a>(
 ) -> Result<(), Error> {
     log::start(common.json_log, &common.log, common.tls.is_some())?;
     check_build(&common.flown.build)?;
-    certificates::check_encryption(endpoints, common.tls.as_ref())?;
+    certificates::check_encryption(endpoints, common)?;
     Ok(())
 }
 

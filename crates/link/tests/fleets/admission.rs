@@ -4,7 +4,7 @@ use crate::input::refused;
 use crate::processes::{LinkProcess, folder, job, signal};
 use crate::support::{run_in_one_process, superconflict};
 use sidestep_session::fleet::{
-    AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Topology,
+    AgentName, ClockMode, CommonSettings, FleetJob, Job, LinkMessage, NodeJob, Topology,
 };
 
 /// A fleet of two in a mesh, of which one node is started by hand.
@@ -36,7 +36,7 @@ impl OpenFleet {
     /// The job of the other node, which listens at some endpoints.
     fn node(&self, listen: &[&str]) -> NodeJob {
         NodeJob {
-            common: self.job.common.clone(),
+            common: CommonSettings { is_insecure: true, ..self.job.common.clone() },
             agent: AgentName::new("airplane", 1, None),
             connect: self.connect.clone(),
             listen: listen.iter().map(|&at| at.into()).collect(),

@@ -35,7 +35,8 @@ fn dismissal() -> Vec<u8> {
         RecipientHeader { peer: PeerId::Node(0), incarnation: None, ack: 0, sequence: None };
     let error = JoinError { cause: "forged".into(), remedy: "none".into() };
     let message = Some(Message::Refused(error));
-    TransportFrame { from: PeerId::Server, incarnation: Incarnation(1), to: vec![header], message }
+    let from = PeerId::Server;
+    TransportFrame { from, incarnation: Incarnation(1), number: 0, to: vec![header], message }
         .encode()
 }
 

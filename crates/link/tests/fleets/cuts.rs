@@ -118,6 +118,7 @@ impl RoutedMachines {
     ) -> (LinkProcess, Vec<LinkProcess>) {
         fleet.nodes = Some(near as usize);
         fleet.listen = vec![format!("tcp/{}:7600", ADDRESSES[0])];
+        fleet.common.is_insecure = true;
         let common = fleet.common.clone();
         let connect = fleet.listen.clone();
         let listen = match fleet.topology {

@@ -84,6 +84,7 @@ impl Drop for Machines {
 fn start(machines: &Machines, mut fleet: FleetJob) -> (LinkProcess, Vec<LinkProcess>) {
     fleet.nodes = Some(2);
     fleet.listen = vec![format!("tcp/{}:7600", ADDRESSES[0])];
+    fleet.common.is_insecure = true;
     let common = fleet.common.clone();
     let connect = fleet.listen.clone();
     let server = LinkProcess::start_in(&machines.names[0], &Job::Fleet(fleet));

@@ -30,7 +30,15 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJ
     };
     let (tls, metrics, log) = (None, None, "error".to_string());
     FleetJob {
-        common: CommonSettings { flown, tls, lease_s: LONG_LEASE_S, metrics, json_log: false, log },
+        common: CommonSettings {
+            flown,
+            tls,
+            is_insecure: false,
+            lease_s: LONG_LEASE_S,
+            metrics,
+            json_log: false,
+            log,
+        },
         nodes: None,
         clock,
         topology,

@@ -28,6 +28,7 @@ fn a_node_is_asked_for_by_the_noun_of_its_world() {
     let common = CommonSettings {
         flown: scenario,
         tls: None,
+        is_insecure: false,
         lease_s: 10.0,
         metrics: None,
         json_log: false,

@@ -80,6 +80,7 @@ fn fleet_job(file: &Path) -> FleetJob {
     let common = CommonSettings {
         flown: JobScenario { file: file.into(), overrides: Vec::new(), build },
         tls: None,
+        is_insecure: false,
         lease_s: LEASE_S,
         metrics: None,
         json_log: false,
