@@ -197,6 +197,7 @@ fn in_real_time_a_chain_stands_in_the_cycles_in_which_a_connector_is_late_and_go
     drop(program.stdin.take());
     let metrics = program.until("the end", |message| match message {
         LinkMessage::Ended { summary, .. } => Some(summary["metrics"].clone()),
+        LinkMessage::Failed(failed) => panic!("{failed:?}"),
         _ => None,
     });
     program.end();

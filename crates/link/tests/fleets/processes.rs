@@ -115,7 +115,10 @@ impl LinkProcess {
         loop {
             let message =
                 self.messages.recv_timeout(until.saturating_duration_since(Instant::now()));
-            let message = message.unwrap_or_else(|e| panic!("waited for {what}: {e}"));
+            let message = message.unwrap_or_else(|e| {
+                let logged = self.logged().join("\n");
+                panic!("waited for {what}: {e}; it logged:\n{logged}")
+            });
             if let Some(found) = wanted(message) {
                 return found;
             }
