@@ -10,6 +10,7 @@ use sidestep_kernel::ports::{RecordError, TableSchema};
 use crate::disk;
 use crate::file_list::{FileList, SharedFileList};
 use crate::manifest::{self, Manifest, Status, json};
+use crate::mcap_request::McapRequest;
 use crate::origin::CycleOrigin;
 use crate::parquet::ParquetRecorder;
 use crate::process_lock::{LockError, ProcessLock, holder_text};
@@ -34,6 +35,8 @@ pub struct NewRun {
     pub cycles_planned: u64,
     /// How its cycles come about.
     pub cycle_origin: CycleOrigin,
+    /// The MCAP file that is written at the same time.
+    pub mcap: Option<McapRequest>,
 }
 
 /// What to do if the folder holds a run already.
@@ -95,6 +98,7 @@ impl RunFolder {
         let Provenance { program_version, scenario, seed } = &run.origin;
         let mut manifest = Manifest {
             build: Some(run.build.clone()),
+            mcap: run.mcap.clone(),
             ..manifest::new_manifest(&run.world, *seed, program_version, run.cycles_planned)
         };
         // A flight is marked before its first cycle: however early it is killed, it is not taken for a simulation.

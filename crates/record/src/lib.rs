@@ -6,6 +6,7 @@ mod file_list;
 mod file_manifest;
 mod flight;
 mod group;
+mod mcap_request;
 mod origin;
 mod part;
 mod process_lock;
@@ -38,6 +39,7 @@ pub use mcap::{
     McapRunInfo, McapSceneReader, Playback, PlaybackPhase, PlaybackRequest, ServedRun, is_mcap,
     start_live_server,
 };
+pub use mcap_request::McapRequest;
 pub use origin::{CycleOrigin, OriginRange, origins_text};
 pub use parquet::ParquetRecorder;
 pub use read::{Table, for_each_block, read_table, row_count, tables};

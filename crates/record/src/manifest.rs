@@ -8,6 +8,7 @@ use sidestep_kernel::ports::RecordError;
 
 use crate::file_list::FileList;
 use crate::format::{self, FormatVersion};
+use crate::mcap_request::McapRequest;
 use crate::origin::OriginRange;
 use crate::sealed_json::{self, Seal};
 
@@ -61,6 +62,9 @@ pub struct Manifest {
     /// Whether a flight in real time ended before its planned end: nothing can continue it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_cut_off: bool,
+    /// The MCAP file that was asked for, if one was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mcap: Option<McapRequest>,
 }
 
 impl Manifest {
@@ -109,6 +113,7 @@ pub(crate) fn new_manifest(
         files: FileList::default(),
         origins: Vec::new(),
         is_cut_off: false,
+        mcap: None,
     }
 }
 

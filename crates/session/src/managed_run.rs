@@ -120,8 +120,12 @@ impl OutputPaths<'_> {
         build: &str,
     ) -> Result<Option<RunRecorder>, Error> {
         let Some(folder) = self.folder else { return Ok(None) };
-        let recording =
-            RecordingPlan { existing: self.if_exists(), build, cycle_origin: self.cycle_origin };
+        let recording = RecordingPlan {
+            existing: self.if_exists(),
+            build,
+            cycle_origin: self.cycle_origin,
+            mcap: self.mcap,
+        };
         RunRecorder::create(folder, resolved, run, recording).map(Some)
     }
 

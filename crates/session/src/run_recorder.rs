@@ -2,12 +2,13 @@
 
 use crate::Error;
 use crate::VERSION;
+use crate::files::resolve_path;
 use crate::flight_recorder::FlightRecorder;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::ports::{RecordError, Recorder};
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{
-    CycleOrigin, IfExists, NewRun, ParquetRecorder, Provenance, ResumePoint, RunFolder,
+    CycleOrigin, IfExists, McapRequest, NewRun, ParquetRecorder, Provenance, ResumePoint, RunFolder,
 };
 use sidestep_scenario::ResolvedScenario;
 use std::path::Path;
@@ -44,6 +45,8 @@ pub struct RecordingPlan<'a> {
     pub build: &'a str,
     /// How its cycles come about.
     pub cycle_origin: CycleOrigin,
+    /// The MCAP file that is written at the same time, and the number of cycles between its frames.
+    pub mcap: Option<(&'a Path, Cycle)>,
 }
 
 impl RunRecorder {
@@ -68,6 +71,9 @@ impl RunRecorder {
             },
             cycles_planned: plan.cycles,
             cycle_origin: recording.cycle_origin,
+            mcap: recording.mcap.map(|(file, every)| {
+                McapRequest::new(&resolve_path(path), &resolve_path(file), every)
+            }),
         };
         let folder = RunFolder::create_with_files(path, &new, &resolved.files, recording.existing)?;
         Ok(Self::start_as(folder, run, recording.cycle_origin)?)

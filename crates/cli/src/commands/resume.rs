@@ -9,12 +9,12 @@ use crate::scenario_args::WorkersArg;
 use crate::sweep::run_remaining;
 use crate::worlds;
 use clap::Args;
-use sidestep::kernel::shell::sidestep_command;
+use sidestep::kernel::shell::{shell_path, sidestep_command};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_record::{RunReader, Status};
 use sidestep_session::sweep::Folder;
 use sidestep_session::{ManagedRun, close_flight, read_summary};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -71,7 +71,32 @@ pub(crate) fn resume(args: &ResumeArgs, console: Console) -> Result<ExitCode, Fa
     let run = ManagedRun::resume(worlds(), &args.folder, workers, args.cycles)?;
     let cycle = group_thousands(run.cycle());
     console.note(format!("Continuing {} at cycle {cycle}", args.folder.display()));
-    run_to_end(run, console)
+    let end = run_to_end(run, console)?;
+    tell_of_mcap(&args.folder, console)?;
+    Ok(end)
+}
+
+/// Tells how to get the MCAP file that the run was to write: it ends where the run was stopped, or has no end at all where
+/// its process was killed. The file is not written unasked, because its place is named by a file in the folder.
+fn tell_of_mcap(folder: &Path, console: Console) -> Result<(), Failure> {
+    let manifest = RunReader::open(folder)?.manifest;
+    let Some(request) = manifest.mcap.filter(|_| manifest.status == Status::Complete) else {
+        return Ok(());
+    };
+    let file = request.path(folder);
+    let (state, replace) = if file.exists() {
+        ("ends where the run was stopped", " --replace")
+    } else {
+        ("was not finished, because the run was killed", "")
+    };
+    let export = sidestep_command("export --to mcap", folder);
+    let out = shell_path(&file);
+    let every = request.every;
+    console.note(format!(
+        "{} {state}; `{export} --every {every} --out {out}{replace}` writes all of it.",
+        file.display()
+    ));
+    Ok(())
 }
 
 /// Closes the recording of a flight, and simulates the rest only if the user asks for it.
@@ -94,6 +119,10 @@ fn resume_flight(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failur
 /// Prints the results of a finished run: a user who resumes all runs need not know which had ended.
 fn print_finished(reader: &RunReader, console: Console) -> Result<ExitCode, Failure> {
     reader.check_files(|_| true)?;
+    let mcap = reader.manifest.mcap.as_ref();
+    if mcap.is_some_and(|request| request.partial_path(&reader.path).exists()) {
+        tell_of_mcap(&reader.path, console)?;
+    }
     let folder = reader.path.display();
     let cycles = group_thousands(reader.manifest.cycles_done);
     console.note(format!(

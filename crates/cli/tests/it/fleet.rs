@@ -258,6 +258,7 @@ fn a_flight_of_which_nothing_is_on_disk_is_an_error_and_no_empty_table() {
         },
         cycles_planned: 12,
         cycle_origin: sidestep_record::CycleOrigin::Flown,
+        mcap: None,
     };
     let refuse = sidestep_record::IfExists::Refuse;
     drop(sidestep_record::RunFolder::create(&place.path("r"), &flight, refuse).expect("created"));

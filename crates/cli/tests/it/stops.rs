@@ -121,6 +121,41 @@ fn killed_then_resumed_to(place: &TestFolder, stops: &[&str]) -> Value {
 }
 
 #[test]
+fn resume_tells_how_to_get_the_mcap_file_that_a_kill_left_incomplete() {
+    let place = TestFolder::new();
+    let args = ["--out", "r", "--mcap", "it's.mcap", "--mcap-every", "50"];
+    let mut child = place.start(&[&LONG[..], &args].concat());
+    wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    let partial = place.run(&["replay", "it's.mcap.partial"]);
+    assert!(partial.code() == 2 && partial.err().contains("was killed"), "{}", partial.err());
+    for _ in 0..2 {
+        // Again once it is complete, for as long as the remains are there.
+        let resumed = place.run(&["resume", "r", "--json"]);
+        assert_eq!(resumed.code(), 0, "{}", resumed.err());
+        let advised =
+            "`sidestep export --to mcap r --every 50 --out \"it's.mcap\"` writes all of it";
+        assert!(resumed.err().contains(advised), "{}", resumed.err());
+    }
+    let export = place.run(&["export", "r", "--to", "mcap", "--every", "50", "--out", "it's.mcap"]);
+    assert_eq!(export.code(), 0, "{}", export.err());
+    assert!(!place.path("it's.mcap.partial").exists(), "what was left is gone");
+    assert_eq!(place.run(&["replay", "it's.mcap"]).code(), 0);
+    assert!(!place.run(&["resume", "r"]).err().contains("mcap"), "nothing is left to tell");
+
+    // A run that is stopped in good order ends its file.
+    let child =
+        place.start(&["run", "s.toml", "--cycles", "60000", "--out", "s", "--mcap", "s.mcap"]);
+    wait_for("a checkpoint", || place.path("s/checkpoint.bin").exists());
+    signal(&child, "INT");
+    assert_eq!(child.wait_with_output().expect("ended").status.code(), Some(130));
+    let resumed = place.run(&["resume", "s"]);
+    let advised = "`sidestep export --to mcap s --every 1 --out s.mcap --replace` writes all of it";
+    assert!(resumed.err().contains(advised), "{}", resumed.err());
+}
+
+#[test]
 fn a_run_killed_before_its_first_checkpoint_starts_again() {
     let place = TestFolder::new();
     let long = [&LONG[..], &["--out", "r", "--set", "record.checkpoint_every=1000000"]].concat();

@@ -59,6 +59,7 @@ pub(crate) fn new_run() -> NewRun {
         origin: origin(),
         cycles_planned: 100,
         cycle_origin: CycleOrigin::Simulated,
+        mcap: None,
     }
 }
 

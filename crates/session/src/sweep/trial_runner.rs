@@ -179,6 +179,7 @@ impl RecordedTrial<'_> {
             existing: IfExists::Replace,
             build: worlds.build(),
             cycle_origin: CycleOrigin::Simulated,
+            mcap: None,
         };
         let recording =
             RunRecorder::create(folder, &resolved, run.as_mut(), plan).map_err(folder_error)?;
