@@ -132,7 +132,7 @@ fn resume_tells_how_to_get_the_mcap_file_that_a_kill_left_incomplete() {
     assert!(partial.code() == 2 && partial.err().contains("was killed"), "{}", partial.err());
     for _ in 0..2 {
         // Again once it is complete, for as long as the remains are there.
-        let resumed = place.run(&["resume", "r", "--json"]);
+        let resumed = place.run(&["resume", "r"]);
         assert_eq!(resumed.code(), 0, "{}", resumed.err());
         let advised =
             "`sidestep export --to mcap r --every 50 --out \"it's.mcap\"` writes all of it";
