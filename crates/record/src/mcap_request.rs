@@ -11,26 +11,28 @@ use crate::disk;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct McapRequest {
     /// Its path from the run folder, e.g. `../office.mcap`; absolute if it is in another branch of the file system.
-    pub file: PathBuf,
+    pub file: String,
     /// Number of cycles between its frames.
     pub every: u64,
 }
 
 impl McapRequest {
-    /// Returns the request of a run in `folder`; both paths are absolute.
-    pub fn new(folder: &Path, file: &Path, every: u64) -> Self {
+    /// Returns the request of a run in `folder`; both paths are absolute. None where the path is no Unicode text, which
+    /// JSON cannot hold.
+    pub fn new(folder: &Path, file: &Path, every: u64) -> Option<Self> {
         let beside = folder.parent().and_then(|parent| file.strip_prefix(parent).ok());
         let file = match (file.strip_prefix(folder), beside) {
             (Ok(inside), _) => inside.to_path_buf(),
             (_, Some(beside)) => Path::new("..").join(beside),
             _ => file.to_path_buf(),
         };
-        Self { file, every }
+        let file = file.into_os_string().into_string().ok()?;
+        Some(Self { file, every })
     }
 
     /// Returns the path of the file, by the path of the folder as a user has given it.
     pub fn path(&self, folder: &Path) -> PathBuf {
-        let mut parts = self.file.components();
+        let mut parts = Path::new(&self.file).components();
         let name = folder.file_name();
         // `runs/office.mcap` reads better than `runs/office/../office.mcap`.
         if parts.next() == Some(Component::ParentDir) && name.is_some() {
@@ -59,7 +61,8 @@ mod tests {
             ("/tmp/a.mcap", "/tmp/a.mcap", "/tmp/a.mcap"),
         ] {
             let request = McapRequest::new(Path::new("/runs/office"), Path::new(file), 20);
-            assert_eq!(request.file, Path::new(stored));
+            let request = request.expect("text");
+            assert_eq!(request.file, stored);
             assert_eq!(request.path(Path::new("there/office")), Path::new(found));
         }
         let beside = McapRequest { file: "../a.mcap".into(), every: 1 };

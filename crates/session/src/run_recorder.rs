@@ -71,7 +71,7 @@ impl RunRecorder {
             },
             cycles_planned: plan.cycles,
             cycle_origin: recording.cycle_origin,
-            mcap: recording.mcap.map(|(file, every)| {
+            mcap: recording.mcap.and_then(|(file, every)| {
                 McapRequest::new(&resolve_path(path), &resolve_path(file), every)
             }),
         };
