@@ -1,10 +1,11 @@
 //! Reports as files: the page, the Markdown version, and its pictures.
 
 use crate::exit::Failure;
+use sidestep::kernel::InputError;
 use sidestep_document::Document;
+use sidestep_record::{FileManifest, FileSet, REPORT};
 use sidestep_report::{RenderedReport, SvgFile, render};
-use sidestep_session::{write_atomically, write_png};
-use std::io::Write;
+use sidestep_session::{VERSION, png_bytes};
 use std::path::{Path, PathBuf};
 
 /// Where a report is stored: all files are beside the page.
@@ -35,32 +36,43 @@ impl ReportFiles {
         self.html.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Writes a report. Every file is replaced as a whole, and the page last: if it is new, all the
-    /// others are.
+    /// Begins a report: nothing is in its place before [`FileSet::commit`], and what is there then is replaced only if it
+    /// is an earlier report that nobody changed.
     ///
     /// # Errors
-    /// When a figure cannot be drawn, or something cannot be written.
-    pub(crate) fn store(&self, document: &Document, raster: PngOutput) -> Result<(), Failure> {
-        let RenderedReport { html, markdown, pictures } = render(document, &self.pictures)?;
-        self.store_pictures(&pictures, raster)?;
-        write_atomically(&self.markdown(), |file| file.write_all(markdown.as_bytes()))?;
-        write_atomically(&self.html, |file| file.write_all(html.as_bytes()))
+    /// When another file has the name of the page or of its list.
+    pub(crate) fn begin(&self) -> Result<FileSet, InputError> {
+        let list = self.html.with_file_name(FileManifest::name_for(&self.stem()));
+        let files = FileSet::new(&list, REPORT, VERSION)?;
+        files.check(&name(&self.html))?;
+        files.check(&name(&self.markdown()))?;
+        Ok(files)
     }
 
-    fn store_pictures(&self, pictures: &[SvgFile], raster: PngOutput) -> Result<(), Failure> {
-        if pictures.is_empty() {
-            return Ok(());
-        }
-        let folder = self.html.parent().unwrap_or(Path::new("")).join(&self.pictures);
-        std::fs::create_dir_all(&folder).map_err(|e| Failure::cannot_write(&folder, &e))?;
-        for SvgFile { stem, svg } in pictures {
-            write_atomically(&folder.join(format!("{stem}.svg")), |file| {
-                file.write_all(svg.as_bytes())
-            })?;
+    /// Adds the page, the Markdown version and the pictures.
+    ///
+    /// # Errors
+    /// When a figure cannot be drawn, something cannot be written, or a file of others has the name of one.
+    pub(crate) fn add(
+        &self,
+        files: &mut FileSet,
+        document: &Document,
+        raster: PngOutput,
+    ) -> Result<(), Failure> {
+        let RenderedReport { html, markdown, pictures } = render(document, &self.pictures)?;
+        for SvgFile { stem, svg } in &pictures {
+            let place = format!("{}/{stem}", self.pictures);
+            files.stage_bytes::<Failure>(&format!("{place}.svg"), svg.as_bytes())?;
             if raster == PngOutput::AlsoPng {
-                write_png(&folder.join(format!("{stem}.png")), svg)?;
+                files.stage_bytes::<Failure>(&format!("{place}.png"), &png_bytes(svg)?)?;
             }
         }
-        Ok(())
+        files.stage_bytes::<Failure>(&name(&self.markdown()), markdown.as_bytes())?;
+        // The page comes last: if it is new, all the others are.
+        files.stage_bytes::<Failure>(&name(&self.html), html.as_bytes())
     }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -30,7 +30,8 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
     rename(&partial, path)
 }
 
-fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
+/// Makes a file of these bytes, and waits for the disk.
+pub(crate) fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = File::create(path)?;
     file.write_all(bytes)?;
     file.sync_all()
@@ -97,6 +98,14 @@ pub(crate) fn parent(path: &Path) -> &Path {
     }
 }
 
+/// Returns the folders that have to be made for a folder, and itself, the outermost first.
+pub(crate) fn missing_folders(folder: &Path) -> Vec<PathBuf> {
+    let ancestors = folder.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
+    let mut missing: Vec<_> = ancestors.map(Path::to_path_buf).collect();
+    missing.reverse();
+    missing
+}
+
 /// Makes the names in a folder durable, if the system can.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> io::Result<()> {
@@ -109,9 +118,9 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// The error of a run folder that cannot be made.
+/// The error of a folder that cannot be made.
 pub(crate) fn cannot_create(path: &Path, cause: impl std::fmt::Display) -> InputError {
-    let cause = format!("cannot make the run folder: {cause}");
+    let cause = format!("cannot make the folder: {cause}");
     InputError::new(path.display(), cause, "give a folder in a place where you may write")
 }
 

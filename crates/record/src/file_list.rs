@@ -120,6 +120,17 @@ impl FileList {
         damaged
     }
 
+    /// Returns the files that are not as they were written, with their paths in the list.
+    pub(crate) fn damaged_entries(&self, folder: &Path) -> Vec<(&str, DamagedFile)> {
+        let checked = self.iter().map(|(name, digest)| (name, check_file(folder, name, digest)));
+        checked.filter_map(|(name, fault)| Some((name, fault?))).collect()
+    }
+
+    /// Returns the digest of a file.
+    pub fn get(&self, name: &str) -> Option<&FileDigest> {
+        self.0.get(name)
+    }
+
     /// Checks all files whose path `is_wanted` wants.
     ///
     /// # Errors

@@ -1,19 +1,26 @@
 //! The list of the files of a report, an export, or a table of a sweep, in a file beside them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
-use crate::file_list::FileList;
+use crate::file_list::{DamagedFile, FileList};
 use crate::format::{self, FormatVersion};
 use crate::sealed_json::{self, Seal};
 
 /// The end of the name of such a file.
 const ENDING: &str = ".manifest.json";
 
-/// The content of `NAME.manifest.json`: files that were written together, by their paths beside it.
+/// The [kind](FileManifest::kind) of the files of a report.
+pub const REPORT: &str = "report";
+/// The [kind](FileManifest::kind) of the files of an export.
+pub const EXPORT: &str = "export";
+
+/// The content of `NAME.manifest.json`: files that were written together, by their paths beside it. `NAME` is that of a
+/// report without its ending, that of an exported file with its ending, because a run has a picture `.svg` and one `.png`,
+/// and `export` in the folder of an export.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileManifest {
     /// Version of the format.
@@ -24,6 +31,9 @@ pub struct FileManifest {
     pub kind: String,
     /// The files and their digests.
     pub files: FileList,
+    /// The files that these take the place of, and their digests: a process that is killed meanwhile leaves some of them.
+    #[serde(default, skip_serializing_if = "FileList::is_empty")]
+    pub replaced: FileList,
 }
 
 impl FileManifest {
@@ -34,7 +44,14 @@ impl FileManifest {
             program_version: program_version.into(),
             kind: kind.into(),
             files: FileList::default(),
+            replaced: FileList::default(),
         }
+    }
+
+    /// Returns the path of the manifest of one file: `NAME.manifest.json` beside it.
+    pub fn beside(path: &Path) -> PathBuf {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        path.with_file_name(Self::name_for(&name))
     }
 
     /// Returns the name of the manifest of files that are called `stem`.
@@ -53,6 +70,16 @@ impl FileManifest {
     /// A missing file, another kind of file, another major format, a wrong digest.
     pub fn read(path: &Path) -> Result<(Self, Seal), InputError> {
         sealed_json::read_sealed(path)
+    }
+
+    /// Returns the files in a folder that are neither as they were written, nor as those that they take the place of.
+    pub fn damaged_in(&self, folder: &Path) -> Vec<DamagedFile> {
+        let is_replaced = |name: &str| {
+            self.replaced.contains(name)
+                && self.replaced.check_in(folder, |other| other == name).is_ok()
+        };
+        let damaged = self.files.damaged_entries(folder).into_iter();
+        damaged.filter(|(name, _)| !is_replaced(name)).map(|(_, file)| file).collect()
     }
 
     /// Writes the manifest in one step.

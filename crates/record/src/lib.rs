@@ -2,8 +2,10 @@
 
 mod disk;
 mod encode;
+mod export_folder;
 mod file_list;
 mod file_manifest;
+mod file_set;
 mod flight;
 mod group;
 mod mcap_request;
@@ -28,16 +30,18 @@ pub mod run_table;
 pub mod sweep;
 pub mod verify;
 
+pub use export_folder::ExportFolder;
 pub use file_list::{DamagedFile, FileFault, FileList, hash_file};
-pub use file_manifest::FileManifest;
+pub use file_manifest::{EXPORT, FileManifest, REPORT};
+pub use file_set::{FileSet, free_name};
 pub use flight::FlightProgress;
 pub use folder::{IfExists, NewRun, ResumePoint, RunFolder};
 pub use format::FormatVersion;
 pub use manifest::{Manifest, Status};
 pub use mcap::{
     BagSchema, BagWriter, LiveFrameWriter, LiveServer, McapFooter, McapProvenance, McapRecorder,
-    McapRunInfo, McapSceneReader, Playback, PlaybackPhase, PlaybackRequest, ServedRun, is_mcap,
-    start_live_server,
+    McapRunInfo, McapSceneReader, Playback, PlaybackPhase, PlaybackRequest, ServedRun, check_mcap,
+    is_mcap, start_live_server,
 };
 pub use mcap_request::McapRequest;
 pub use origin::{CycleOrigin, OriginRange, origins_text};

@@ -1,10 +1,15 @@
-//! What a new run may take the place of: the files of an old one that are as they were written. Nothing else is deleted.
+//! What a new run or export may take the place of: the files of an old one that are as they were written. Nothing else is
+//! deleted.
 
+use std::collections::BTreeSet;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use sidestep_kernel::InputError;
 
-use crate::run_content::{RunContent, list_tree, unreadable};
+use crate::export_folder::ExportFolder;
+use crate::file_manifest::{EXPORT, FileManifest};
+use crate::run_content::{RunContent, list_tree, slashed, unreadable};
 use crate::run_reader::RunReader;
 use crate::sealed_json::Seal;
 
@@ -46,7 +51,7 @@ impl Replacement {
         for path in list_tree(folder).map_err(|e| unreadable(folder, &e))? {
             if run.is_changed(&path) {
                 obstacles.changed.push(path);
-            } else if run.is_own(&path) {
+            } else if run.is_own(&path) && is_plain(&folder.join(&path)) {
                 content.own.push(path);
             } else if run.is_in_the_way(&path) {
                 obstacles.in_the_way.push(path);
@@ -57,6 +62,66 @@ impl Replacement {
         obstacles.check(folder)?;
         Ok(content)
     }
+
+    /// Returns what may be deleted of an exported folder, and what stays.
+    ///
+    /// # Errors
+    /// A folder without a list of its files; a file that was changed.
+    pub(crate) fn of_export(folder: &Path) -> Result<Self, InputError> {
+        let list = ExportFolder::list_name();
+        let place = folder.join(&list);
+        if fs::symlink_metadata(&place).is_err() {
+            let cause = "no list names the files in this folder: another program wrote them, or an older version of this one";
+            let remedy = "give another place with --out, or remove this one yourself";
+            return Err(InputError::new(folder.display(), cause, remedy));
+        }
+        let (manifest, _) = FileManifest::read(&place)?;
+        if manifest.kind != EXPORT {
+            let cause = format!("this is the list of another kind of files: {}", manifest.kind);
+            let remedy = "give another place with --out";
+            return Err(InputError::new(place.display(), cause, remedy));
+        }
+        let changed = manifest.files.damaged_in(folder, |_| true).into_iter().map(|file| file.path);
+        let changed: BTreeSet<_> = changed.collect();
+        let mut content = Self::default();
+        let mut obstacles = Obstacles::default();
+        for path in list_tree(folder).map_err(|e| unreadable(folder, &e))? {
+            let whole = folder.join(&path);
+            let is_listed = path == Path::new(&list) || manifest.files.contains(&slashed(&path));
+            if !is_listed {
+                content.others.push(path);
+            } else if changed.contains(&whole) || !is_plain(&whole) {
+                obstacles.changed.push(path);
+            } else {
+                content.own.push(path);
+            }
+        }
+        obstacles.check(folder)?;
+        Ok(content)
+    }
+
+    /// Refuses a new folder in which a file of others would have the name of a new file. `target` is its later place.
+    ///
+    /// # Errors
+    /// The files that are in the way.
+    pub(crate) fn check_room_in(&self, new: &Path, target: &Path) -> Result<(), InputError> {
+        let is_taken = |path: &&PathBuf| {
+            let [old, new] = [target.join(path), new.join(path)];
+            // Two folders become one.
+            fs::symlink_metadata(&new).is_ok() && !(is_folder(&old) && is_folder(&new))
+        };
+        let in_the_way = self.others.iter().filter(is_taken).cloned().collect();
+        Obstacles { in_the_way, ..Obstacles::default() }.check(target)
+    }
+}
+
+/// Returns whether there is a file or a folder, and no link to one.
+fn is_plain(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|found| found.is_file() || found.is_dir())
+}
+
+fn is_folder(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|found| found.is_dir())
 }
 
 impl Obstacles {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use sidestep_kernel::InputError;
 
 use crate::file_list::{DamagedFile, locate};
-use crate::file_manifest::FileManifest;
+use crate::file_manifest::{FileManifest, REPORT};
 use crate::manifest::Status;
 use crate::part::first_cycle;
 use crate::run_reader::{CHECKPOINT, LOCK, MANIFEST, RunReader, SCENARIO, SUMMARY};
@@ -21,12 +21,14 @@ const MAX_PROCESS_ID_BYTES: u64 = 10;
 /// The folder of the files that a scenario names.
 const INPUTS: &str = "inputs";
 
-/// The files of a run folder: those of its manifest, and those of reports in it.
+/// The files of a run folder: those of its manifest, and those of reports and exports in it.
 pub(crate) struct RunContent {
     folder: PathBuf,
     is_complete: bool,
     /// The paths that the manifests name, as they are on the disk.
     pub(crate) listed: BTreeSet<PathBuf>,
+    /// Exports that the user has put there, which a new run does not replace, with their lists.
+    pub(crate) exported: BTreeSet<PathBuf>,
     pub(crate) damaged: Vec<DamagedFile>,
     changed: BTreeSet<PathBuf>,
     /// Folders of tables and inputs: nothing else may lie in them.
@@ -44,6 +46,7 @@ impl RunContent {
             folder: folder.clone(),
             is_complete: run.manifest.status == Status::Complete,
             listed: BTreeSet::new(),
+            exported: BTreeSet::new(),
             damaged: Vec::new(),
             changed: BTreeSet::new(),
             folders: BTreeSet::from([INPUTS.to_string()]),
@@ -55,10 +58,11 @@ impl RunContent {
         content.damaged = run.damaged_files(|_| true);
         content.add_reports().map_err(|e| unreadable(folder, &e))?;
         content.changed = content.damaged.iter().map(|file| content.relative(&file.path)).collect();
+        content.changed.retain(|path| !content.exported.contains(path));
         Ok(content)
     }
 
-    /// Adds the reports in the folder that are as they were written.
+    /// Adds the reports and exports in the folder.
     fn add_reports(&mut self) -> io::Result<()> {
         for entry in fs::read_dir(&self.folder)? {
             let path = entry?.path();
@@ -72,11 +76,12 @@ impl RunContent {
                     continue;
                 }
             };
-            for (name, _) in report.files.iter() {
-                self.listed.insert(PathBuf::from(name));
-            }
-            self.damaged.extend(report.files.damaged_in(&self.folder, |_| true));
-            self.listed.insert(self.relative(&path));
+            let own = self.relative(&path);
+            let is_report = report.kind == REPORT;
+            let names = if is_report { &mut self.listed } else { &mut self.exported };
+            names.extend(report.files.iter().map(|(name, _)| PathBuf::from(name)));
+            names.insert(own);
+            self.damaged.extend(report.damaged_in(&self.folder));
         }
         Ok(())
     }

@@ -25,12 +25,7 @@ impl StagingFolder {
     pub(crate) fn new(target: &Path) -> Result<Self, InputError> {
         let target = resolve_link(target).map_err(|e| cannot_create(target, e))?;
         let path = hidden_sibling(&target, "new")?;
-        let mut made: Vec<_> = disk::parent(&target)
-            .ancestors()
-            .take_while(|p| !p.as_os_str().is_empty() && !p.exists())
-            .map(Path::to_path_buf)
-            .collect();
-        made.reverse();
+        let made = disk::missing_folders(disk::parent(&target));
         let staging = Self { path, target, made };
         staging.make().map_err(|e| cannot_create(&staging.target, e))?;
         Ok(staging)
@@ -50,6 +45,7 @@ impl StagingFolder {
     pub(crate) fn commit(mut self, old: &Replacement) -> Result<(), InputError> {
         let target = &self.target;
         let failed = |e: io::Error| cannot_create(target, e);
+        old.check_room_in(&self.path, target)?;
         // The old folder is kept beside the new one until that is in place: a failure leaves one of them whole.
         let aside = hidden_sibling(target, "old")?;
         let replaces = target.exists();

@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use sidestep_kernel::InputError;
 
+use crate::export_folder::ExportFolder;
 use crate::file_list::DamagedFile;
 use crate::file_manifest::FileManifest;
 use crate::manifest::{Manifest, SWEEP_MANIFEST, Status};
+use crate::mcap::{check_mcap, is_begun_by_us, is_mcap};
 use crate::part::first_cycle;
 use crate::read::check_part;
 use crate::run_content::{RunContent, list_tree, slashed, unreadable};
@@ -90,6 +92,33 @@ impl Verification {
         }
     }
 
+    /// Adds the files of a list, and returns it.
+    fn add_listed(&mut self, list: &Path) -> Option<FileManifest> {
+        match FileManifest::read(list) {
+            Err(error) => {
+                self.damaged.push(DamagedFile::from_error(list.to_path_buf(), &error));
+                None
+            }
+            Ok((manifest, seal)) => {
+                self.add_seal(list, seal);
+                let damaged = manifest.damaged_in(crate::disk::parent(list));
+                self.sound += manifest.files.iter().count() - damaged.len();
+                self.damaged.extend(damaged);
+                Some(manifest)
+            }
+        }
+    }
+
+    /// Adds a file that no list names: a recording for viewers, or a file of others.
+    fn add_other(&mut self, path: PathBuf) {
+        if is_mcap(&path) && is_begun_by_us(&path) {
+            let checked = check_mcap(&path);
+            self.add(path, checked);
+        } else {
+            self.others.push(path);
+        }
+    }
+
     fn append(&mut self, other: Self) {
         self.sound += other.sound;
         self.damaged.extend(other.damaged);
@@ -98,7 +127,8 @@ impl Verification {
     }
 }
 
-/// Verifies a run folder, the folder of a sweep, a report (its page or its list of files), or the folder of an export.
+/// Verifies a run folder, the folder of a sweep, a report (its page or its list of files), an export (a folder or a file), or
+/// an MCAP file.
 ///
 /// # Errors
 /// When it is none of these, or cannot be read at all. Damage is no error.
@@ -110,11 +140,12 @@ pub fn verify(path: &Path) -> Result<Verification, InputError> {
         return verify_run(path);
     }
     match find_list(path) {
-        Some(list) => Ok(verify_listed(path, &list)),
+        Some(list) => verify_listed(path, &list),
+        None if is_mcap(path) => Ok(verify_mcap(path)),
         None => {
             let cause =
                 "this is no run, no sweep, and no report or export with a list of its files";
-            let remedy = "give a folder that `sidestep run` or `sidestep sweep` wrote, or the page of a report";
+            let remedy = "give a folder that `sidestep run` or `sidestep sweep` wrote, the page of a report, or an exported file";
             Err(InputError::new(path.display(), cause, remedy))
         }
     }
@@ -129,23 +160,38 @@ fn find_list(path: &Path) -> Option<PathBuf> {
     if FileManifest::is_named(path) {
         return Some(path.to_path_buf());
     }
-    let list = path.with_file_name(FileManifest::name_for(&path.file_stem()?.to_string_lossy()));
-    list.is_file().then_some(list)
+    let stem = FileManifest::name_for(&path.file_stem()?.to_string_lossy());
+    let of_folder = path.with_file_name(ExportFolder::list_name());
+    let mut lists = [FileManifest::beside(path), path.with_file_name(stem), of_folder].into_iter();
+    lists.find(|list| list.is_file())
 }
 
-fn verify_listed(path: &Path, list: &Path) -> Verification {
+fn verify_mcap(path: &Path) -> Verification {
     let mut result = Verification::new(path, VerifiedKind::Files);
-    let folder = crate::disk::parent(list);
-    match FileManifest::read(list) {
-        Err(error) => result.damaged.push(DamagedFile::from_error(list.to_path_buf(), &error)),
-        Ok((manifest, seal)) => {
-            result.add_seal(list, seal);
-            let damaged = manifest.files.damaged_in(folder, |_| true);
-            result.sound += manifest.files.iter().count() - damaged.len();
-            result.damaged.extend(damaged);
-        }
-    }
+    result.add(path, check_mcap(path));
     result
+}
+
+/// Verifies the files of a list. A file may be given that it does not name.
+fn verify_listed(path: &Path, list: &Path) -> Result<Verification, InputError> {
+    let mut result = Verification::new(path, VerifiedKind::Files);
+    let manifest = result.add_listed(list);
+    let Some(manifest) = manifest else { return Ok(result) };
+    let folder = crate::disk::parent(list);
+    if path.is_dir() {
+        let is_named =
+            |file: &PathBuf| folder.join(file) == list || manifest.files.contains(&slashed(file));
+        let all = list_tree(path).map_err(|e| unreadable(path, &e))?;
+        let others = all.into_iter().filter(|file| !is_named(file));
+        result.others.extend(others.map(|file| path.join(file)));
+    } else if path != list
+        && !manifest.files.iter().any(|(name, _)| list.with_file_name(name) == path)
+    {
+        let cause = format!("{} does not name this file", list.display());
+        let remedy = "give the page of a report, or an exported file";
+        return Err(InputError::new(path.display(), cause, remedy));
+    }
+    Ok(result)
 }
 
 fn verify_run(path: &Path) -> Result<Verification, InputError> {
@@ -164,10 +210,11 @@ fn verify_run(path: &Path) -> Result<Verification, InputError> {
     let reader = RunReader { path: path.to_path_buf(), manifest, scenario: String::new(), seal };
     let content = RunContent::new(&reader)?;
     result.damaged.extend(content.damaged.iter().cloned());
-    let named = content.listed.len();
+    let named = content.listed.len() + content.exported.len();
     result.sound += named.saturating_sub(content.damaged.len());
     for file in list_tree(path).map_err(|e| unreadable(path, &e))? {
-        if content.listed.contains(&file) || file == Path::new(MANIFEST) {
+        let is_named = content.listed.contains(&file) || content.exported.contains(&file);
+        if is_named || file == Path::new(MANIFEST) {
             continue;
         }
         let whole = path.join(&file);
@@ -183,7 +230,7 @@ fn verify_run(path: &Path) -> Result<Verification, InputError> {
                 result.remarks.push(format!("{} is of a run that was stopped", whole.display()));
             }
         } else if seal == Seal::Confirmed {
-            result.others.push(whole);
+            result.add_other(whole);
         }
     }
     Ok(result)
@@ -214,26 +261,27 @@ fn verify_sweep(path: &Path) -> Result<Verification, InputError> {
         }
         own.insert(run);
     }
+    let mut others = Vec::new();
     for file in list_tree(path).map_err(|e| unreadable(path, &e))? {
         let whole = path.join(&file);
         if own.iter().any(|own| whole.starts_with(own)) {
             continue;
         }
         if FileManifest::is_named(&whole) {
-            result.append(verify_listed(path, &whole));
-            own.insert(whole.clone());
-            let names = FileManifest::read(&whole).map(|(list, _)| list.files);
-            for (name, _) in names.unwrap_or_default().iter() {
-                own.insert(path.join(name));
-            }
+            let listed = result.add_listed(&whole);
+            let folder = crate::disk::parent(&whole);
+            let names = listed.iter().flat_map(|list| list.files.iter());
+            own.extend(names.map(|(name, _)| folder.join(name)));
+            own.insert(whole);
         } else {
-            result.others.push(whole);
+            others.push(whole);
         }
     }
     // A report's files sort before its list.
-    result.others.retain(|file| !own.contains(file));
-    result.others.retain(|file| {
+    others.retain(|file| !own.contains(file));
+    others.retain(|file| {
         !SweepFolder::<Value>::is_remains(&slashed(file.strip_prefix(path).unwrap_or(file)))
     });
+    others.into_iter().for_each(|file| result.add_other(file));
     Ok(result)
 }

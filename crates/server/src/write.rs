@@ -80,6 +80,9 @@ pub(crate) fn replace_file(
     is_own: bool,
     may_replace: impl Fn(Option<&str>) -> bool,
 ) -> Result<Option<String>, Problem> {
+    if is_in_recording(&target.real) {
+        return Err(in_recording(target.path.display().to_string()));
+    }
     let old = read_old_content(target)?;
     if let Some(old) = &old {
         check_replaceable(target, old, is_own)?;
@@ -147,8 +150,7 @@ fn check_replaceable(target: &WriteTarget, old: &OldContent, is_own: bool) -> Re
     }
     // A recording keeps the scenario that was run.
     if ["run.json", "sweep.json"].iter().any(|name| target.real.with_file_name(name).is_file()) {
-        let remedy = "save it outside of the recording's folder";
-        return Err(Problem::new(place, "belongs to a recording", remedy));
+        return Err(in_recording(place));
     }
     let values = Source::new(place.as_str(), old.text.as_str(), "").parse::<Value>();
     let is_scenario = values.is_ok_and(|values| values["world"].is_string());
@@ -157,6 +159,22 @@ fn check_replaceable(target: &WriteTarget, old: &OldContent, is_own: bool) -> Re
         return Err(Problem::new(place, cause, "save it under another name"));
     }
     Ok(())
+}
+
+fn in_recording(place: String) -> Problem {
+    let remedy = "save it outside of the recording's folder";
+    Problem::new(place, "belongs to a recording", remedy)
+}
+
+/// Returns whether a file lies where a recording keeps the files of the scenario that was run, or a sweep those that it planned.
+fn is_in_recording(path: &Path) -> bool {
+    let kept = [("inputs", "run.json"), ("variants", "sweep.json")];
+    path.ancestors().skip(1).any(|folder| {
+        let has = |(name, manifest): (&str, &str)| {
+            folder.ends_with(name) && folder.with_file_name(manifest).is_file()
+        };
+        kept.into_iter().any(has)
+    })
 }
 
 fn write_error(target: &WriteTarget, error: &io::Error) -> Problem {

@@ -1,6 +1,7 @@
 //! Files that are written completely or not at all.
 
 use crate::Error;
+use sidestep_record::{free_name, resolve_link};
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
 use std::path::{Path, PathBuf};
@@ -48,11 +49,14 @@ pub(crate) fn replace_atomically<T>(
     path: &Path,
     make: impl FnOnce(&Path) -> std::result::Result<T, Error>,
 ) -> std::result::Result<T, Error> {
+    // A link stays: the file that it leads to is replaced.
+    let path = &resolve_link(path).map_err(|e| Error::cannot_write(path, &e))?;
+    if std::fs::symlink_metadata(path).is_ok_and(|found| !found.is_file()) {
+        return Err(Error::cannot_write(path, &std::io::Error::other("this is no file")));
+    }
     // Beside the target, because a file is renamed in one step only within its file system; with the process id,
     // because two processes may write the same file at once.
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(format!(".{}.partial", std::process::id()));
-    let partial = Path::new(&partial);
+    let partial = &free_name(path);
     let made = make(partial).and_then(|made| {
         std::fs::rename(partial, path).map_err(|e| Error::cannot_write(path, &e))?;
         Ok(made)
@@ -63,8 +67,11 @@ pub(crate) fn replace_atomically<T>(
     made
 }
 
-/// Fills a file, in a folder that is created if there is none.
-fn write_file(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
+/// Fills a file, in a folder that is created if there is none, and waits for the disk.
+pub(crate) fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
+) -> Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }

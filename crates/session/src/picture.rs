@@ -63,7 +63,15 @@ pub(crate) fn footnote(run: &dyn Simulation) -> String {
 /// # Errors
 /// When it cannot be drawn or written.
 pub fn write_png(path: &Path, svg: &str) -> Result<(), Error> {
-    write_bytes(path, &to_png(svg, PNG_WIDTH_PX)?)
+    write_bytes(path, &png_bytes(svg)?)
+}
+
+/// Returns an SVG picture as PNG.
+///
+/// # Errors
+/// When it cannot be drawn.
+pub fn png_bytes(svg: &str) -> Result<Vec<u8>, Error> {
+    Ok(to_png(svg, PNG_WIDTH_PX)?)
 }
 
 fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Error> {

@@ -9,7 +9,9 @@ use sidestep_kernel::Simulation;
 use sidestep_kernel::checkpoint::decode_header;
 use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::{Cycle, InputError};
-use sidestep_record::{McapRunInfo, OriginRange, ResumePoint, RunReader, Status, is_mcap, tables};
+use sidestep_record::{
+    McapRunInfo, OriginRange, ResumePoint, RunReader, Status, check_mcap, is_mcap, tables,
+};
 use sidestep_scenario::ResolvedScenario;
 use sidestep_scenario::{Source, Worlds};
 use std::path::{Path, PathBuf};
@@ -84,6 +86,7 @@ impl RecordedRun {
 
     fn from_mcap(worlds: &Worlds, path: &Path) -> Result<Self, Error> {
         let run = McapRunInfo::open(path).map_err(|e| explain_partial(path, e))?;
+        check_mcap(path)?;
         let files =
             tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
         write_inputs(files.path(), &run.files)?;

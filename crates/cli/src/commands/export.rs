@@ -26,7 +26,11 @@ Examples:
 
 Tables are copied from the run folder; those of a flight in real time come with a file that says \
 which cycles were flown and which simulated. Everything else is computed again from the recorded \
-scenario; an export that includes the recorded end confirms the recorded digest there.";
+scenario; an export that includes the recorded end confirms the recorded digest there.
+
+A list with the digests of what was written comes with it: export.manifest.json in a folder, FILE.manifest.json \
+beside a file; an MCAP file has checksums of its own. `sidestep verify PATH` compares them, and --replace \
+deletes nothing else: files of others stay, and an export that was changed is left alone.";
 
 /// The output formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -126,7 +130,7 @@ pub(crate) struct ExportArgs {
     #[command(flatten)]
     workers: WorkersArg,
 
-    /// Overwrite an earlier export
+    /// Replace an earlier export, if its files are as they were written; files of others in its folder stay
     #[arg(long)]
     replace: bool,
 }

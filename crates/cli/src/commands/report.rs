@@ -9,10 +9,10 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep_document::Document;
+use sidestep_record::FileSet;
 use sidestep_report::{PrintStyle, SvgFile};
 use sidestep_session::report::document;
-use sidestep_session::{display_path, write_atomically, write_png};
-use std::io::Write;
+use sidestep_session::{display_path, png_bytes};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -23,7 +23,11 @@ Examples:
   sidestep report sweeps/methods --figure svg,png --figure-size 85x60
 
 The page is one file that needs no network. A run that is not complete can be reported too; its \
-report says so.";
+report says so.
+
+A list with the digests of all files is written beside the page, NAME.manifest.json: `sidestep verify PAGE` \
+compares them. An earlier report is replaced if its files are as they were written; a page of others, or one \
+that was changed, is not.";
 
 /// Write a report of a run or a sweep: one HTML file, and Markdown.
 #[derive(Debug, Args)]
@@ -79,10 +83,14 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
     let files = report_files(args)?;
     // Wrong options are refused before a large folder is read.
     let figures = args.print.figures()?;
+    files.begin()?;
     let document = document(worlds(), &args.folder, &ConsoleWatcher::new(console))?;
     figures.iter().try_for_each(|print| check_labels(print, &document))?;
-    files.store(&document, PngOutput::None)?;
-    let figures = figures.map(|print| args.print.store(&print, &document, &files)).transpose()?;
+    let mut listed = files.begin()?;
+    let figures =
+        figures.map(|print| args.print.add(&print, &document, &files, &mut listed)).transpose()?;
+    files.add(&mut listed, &document, PngOutput::None)?;
+    listed.commit()?;
     let html = files.html.display();
     let markdown = files.markdown();
     let figures = figures.as_ref().map(|folder| folder.display().to_string());
@@ -119,28 +127,28 @@ impl PrintArgs {
         Ok(Some(PrintStyle { size_mm, font_pt: self.figure_font, labels }))
     }
 
-    /// Writes the figures beside the page, and returns their folder.
+    /// Adds the figures beside the page, and returns their folder.
     ///
     /// # Errors
     /// When something cannot be drawn or written.
-    fn store(
+    fn add(
         &self,
         print: &PrintStyle,
         document: &Document,
         files: &ReportFiles,
+        listed: &mut FileSet,
     ) -> Result<PathBuf, Failure> {
-        let folder = files.html.with_file_name(format!("{}-print", files.stem()));
-        std::fs::create_dir_all(&folder).map_err(|e| Failure::cannot_write(&folder, &e))?;
+        let folder = format!("{}-print", files.stem());
         for SvgFile { stem, svg } in print.figures(document)? {
             if self.forms.contains(&FigureFormat::Svg) {
-                let path = folder.join(format!("{stem}.svg"));
-                write_atomically(&path, |file| file.write_all(svg.as_bytes()))?;
+                listed.stage_bytes::<Failure>(&format!("{folder}/{stem}.svg"), svg.as_bytes())?;
             }
             if self.forms.contains(&FigureFormat::Png) {
-                write_png(&folder.join(format!("{stem}.png")), &svg)?;
+                listed
+                    .stage_bytes::<Failure>(&format!("{folder}/{stem}.png"), &png_bytes(&svg)?)?;
             }
         }
-        Ok(folder)
+        Ok(files.html.with_file_name(folder))
     }
 }
 

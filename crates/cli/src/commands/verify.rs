@@ -14,17 +14,18 @@ Examples:
   sidestep verify runs/office
   sidestep verify runs/* sweeps/methods
   sidestep verify office.html           a report, by its page
+  sidestep verify runs/office-csv runs/office.gif runs/office.mcap
   sidestep verify runs/office --json | jq '.paths[].damaged'
 
 Compares every file with the digest that was written of it: of runs, sweeps with their recorded runs, reports and \
-exports. Files of others in a folder are listed, and are no error. The exit code is 2 if a file is damaged, was \
+exports. MCAP files are compared with their own checksums. Files of others in a folder are listed, and are no error. The exit code is 2 if a file is damaged, was \
 changed, or is missing.";
 
 /// Check that every file of a recording is as it was written.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct VerifyArgs {
-    /// Folders of runs, sweeps or exports; pages of reports
+    /// Folders of runs, sweeps or exports; exported files, MCAP files, pages of reports
     #[arg(value_name = "RUN", required = true)]
     paths: Vec<PathBuf>,
 }

@@ -106,7 +106,8 @@ fn pictures_and_films_are_drawn() {
     let told = place.run(&[&film[..], &["--every", "10", "--width", "200"]].concat());
     assert!(told.out().contains("ffmpeg -framerate 15"), "{}{}", told.out(), told.err());
     let numbered = ["frame-00001.png", "frame-00002.png", "frame-00003.png", "frame-00004.png"];
-    assert_eq!(names(&place.path("r-frames")), numbered);
+    let files = [&["export.manifest.json"], &numbered[..]].concat();
+    assert_eq!(names(&place.path("r-frames")), files);
     let moment = ["export", "r", "--to", "svg", "--from", "123", "--out", "moment.svg"];
     assert_eq!(place.run(&moment).code(), 0);
     assert!(place.read("moment.svg").contains("Cycle 123."));
@@ -122,15 +123,51 @@ fn what_is_there_is_replaced_only_when_asked() {
         assert_eq!((refused.code(), refused.out().as_str()), (2, ""), "{form}");
         assert!(refused.err().contains("--replace"), "{}", refused.err());
     }
+    let refused = place.run(&["export", "r", "--to", "gif", "--replace"]);
+    assert_eq!(refused.code(), 2, "a file of others is left alone");
+    assert!(refused.err().contains("no list names this file"), "{}", refused.err());
     assert_eq!(place.read("r.gif"), "mine");
     let mcap = ["run", "s.toml", "--cycles", "10", "--mcap", "r.mcap"];
     assert_eq!(place.run(&mcap).code(), 2, "a recording is no less safe");
     assert_eq!(place.run(&[&mcap[..], &["--replace"]].concat()).code(), 0);
-    assert_eq!(place.run(&["export", "r", "--to", "csv", "--replace"]).code(), 0);
     place.write("r-csv/notes.txt", "mine");
-    let refused = place.run(&["export", "r", "--to", "csv", "--replace"]);
-    assert_eq!(refused.code(), 2, "a folder with something else is left alone");
-    assert_eq!(place.read("r-csv/notes.txt"), "mine");
+    let tables = ["export", "r", "--to", "csv", "--replace"];
+    assert_eq!(place.run(&tables).code(), 0);
+    assert_eq!(place.read("r-csv/notes.txt"), "mine", "files of others stay");
+    place.write("r-csv/events.csv", "edited");
+    let refused = place.run(&tables);
+    assert_eq!((refused.code(), place.read("r-csv/events.csv").as_str()), (2, "edited"));
+    assert!(
+        refused.err().contains("changed since they were written: events.csv"),
+        "{}",
+        refused.err()
+    );
+}
+
+#[test]
+fn a_recording_for_viewers_is_replaced_only_if_it_is_ours_and_whole() {
+    let place = recorded();
+    let again = ["run", "s.toml", "--cycles", "10", "--mcap", "r.mcap", "--replace"];
+    let whole = std::fs::read(place.path("r.mcap")).expect("read");
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 3] ^= 4;
+    for other in [&b"mine"[..], b"\x89MCAP0\r\nof others", &flipped] {
+        place.write("r.mcap", other);
+        let refused = place.run(&again);
+        assert_eq!(refused.code(), 2, "{}", refused.err());
+        assert!(std::fs::read(place.path("r.mcap")).expect("there") == other);
+    }
+    place.write("r.mcap", &whole);
+    place.write("r.mcap.partial", "mine");
+    let refused = place.run(&again);
+    assert!(refused.err().contains("another program"), "{}", refused.err());
+    assert_eq!(place.read("r.mcap.partial"), "mine");
+    // As a killed process leaves it.
+    place.write("r.mcap.partial", &whole[..whole.len() / 2]);
+    let refused = place.run(&["run", "s.toml", "--mcap", "new/../r.mcap"]);
+    assert_eq!(refused.code(), 2, "what was recorded is not overwritten unasked");
+    assert_eq!(place.run(&again).code(), 0);
+    assert!(!place.path("r.mcap.partial").exists());
 }
 
 #[test]

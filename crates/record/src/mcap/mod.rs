@@ -24,6 +24,7 @@
 //! with. Because it may miss some, a live `/scene` deletes all bodies before it shows them.
 
 mod bag;
+mod check;
 mod frame_encoder;
 mod live;
 mod messages;
@@ -32,6 +33,8 @@ mod scene_reader;
 mod writer;
 
 pub use bag::{BagSchema, BagWriter};
+pub use check::check_mcap;
+pub(crate) use check::is_begun_by_us;
 pub use live::{
     LiveFrameWriter, LiveServer, Playback, PlaybackPhase, PlaybackRequest, ServedRun,
     start_live_server,

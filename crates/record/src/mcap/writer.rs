@@ -12,9 +12,11 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 use sidestep_kernel::view::{Frame, Scenery};
 
+use super::check::{LIBRARY, check_mcap, is_begun_by_us};
 use super::frame_encoder::{FrameEncoder, MessageSink};
 use super::{METADATA, SCENARIO};
 use crate::disk;
+use crate::file_set::in_the_way;
 use crate::folder::IfExists;
 use crate::format;
 use crate::manifest::Status;
@@ -70,20 +72,36 @@ struct FileOutput {
 }
 
 impl McapRecorder {
-    /// Refuses a path at which a recording must not be created.
+    /// Refuses a path at which a recording must not be created. Only a recording of this program that is as it was written
+    /// is replaced, and the remains of one that was stopped or killed.
     ///
     /// # Errors
     /// Something is there that may not be replaced, or that is not a file.
     pub fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputError> {
-        let (cause, remedy) = match fs::metadata(path) {
-            Ok(found) if !found.is_file() => ("this is no file", "give a new file"),
-            Ok(_) if existing == IfExists::Refuse => {
-                ("the file exists already", "give another file, or replace it (--replace)")
+        if path.file_name().is_none() {
+            let remedy = "give a new file";
+            return Err(InputError::new(path.display(), "this is no file name", remedy));
+        }
+        let remains = disk::partial_path(path);
+        for (place, is_whole) in [(path, true), (&*remains, false)] {
+            let Ok(found) = fs::symlink_metadata(place) else { continue };
+            if !found.is_file() {
+                return Err(in_the_way(place, &found));
             }
-            _ if path.file_name().is_none() => ("this is no file name", "give a new file"),
-            _ => return Ok(()),
-        };
-        Err(InputError::new(path.display(), cause, remedy))
+            match existing {
+                IfExists::Refuse => return Err(exists_already(place, is_whole)),
+                IfExists::Replace if is_whole => check_mcap(place).map_err(|e| {
+                    InputError::new(e.place(), e.cause(), "move it away, or give another file")
+                })?,
+                IfExists::Replace if is_begun_by_us(place) => {}
+                IfExists::Replace => {
+                    let cause = "another program wrote this file";
+                    let remedy = "move it away, or give another file";
+                    return Err(InputError::new(place.display(), cause, remedy));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Starts the file that is called `path` once it is complete, with the scenario and everything
@@ -266,6 +284,14 @@ impl Drop for McapRecorder {
     }
 }
 
+fn exists_already(path: &Path, is_whole: bool) -> InputError {
+    let cause = match is_whole {
+        true => "the file exists already",
+        false => "a recording that was stopped or killed is there",
+    };
+    InputError::new(path.display(), cause, "give another file, or replace it (--replace)")
+}
+
 /// Returns the compression, chunk size and origin of files that this version of the program writes.
 pub(super) fn write_options(version: &str) -> WriteOptions {
     // Several threads would compress to bytes that differ from those of one.
@@ -273,7 +299,7 @@ pub(super) fn write_options(version: &str) -> WriteOptions {
         .compression(Some(Compression::Zstd))
         .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES))
-        .library(format!("sidestep {version}"))
+        .library(format!("{LIBRARY}{version}"))
 }
 
 /// Returns the system's message, without the library's wrapping.

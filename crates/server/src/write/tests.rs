@@ -129,8 +129,17 @@ fn what_cannot_be_replaced_stays_as_it_is() {
     fs::create_dir(inside.join("run")).expect("made");
     fs::write(inside.join("run/run.json"), "{}").expect("written");
     fs::write(inside.join("run/scenario.toml"), SCENARIO).expect("written");
+    for folder in ["run/inputs", "sweep/variants/0000"] {
+        fs::create_dir_all(inside.join(folder)).expect("made");
+        fs::write(inside.join(folder).join("scenario.toml"), SCENARIO).expect("written");
+        let new = files.write_target(&place(&format!("{folder}/new.toml"))).expect("a place");
+        assert!(replace_file(&new, "new", false, |_| true).is_ok() == folder.starts_with("sweep"));
+    }
+    fs::write(inside.join("sweep/sweep.json"), "{}").expect("written");
     for (name, is_own, cause) in [
         ("run/scenario.toml", true, "a recording"),
+        ("run/inputs/scenario.toml", true, "a recording"),
+        ("sweep/variants/0000/scenario.toml", true, "a recording"),
         ("packed.toml", true, "packed"),
         ("bytes.toml", true, "UTF-8"),
         ("a.toml", true, "only be read"),

@@ -4,7 +4,7 @@
 //! its id, its call sign, and for each place the seconds since the start of the run, or since 1970 where the run has a
 //! date.
 
-use super::tables::{TableExport, TableFormat, partial_path};
+use super::tables::{TableExport, TableFormat};
 use super::target::Target;
 use super::{ExportContext, ExportResult};
 use crate::Error;
@@ -13,8 +13,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::ColumnValues;
 use sidestep_record::Table;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 
 /// The table that has the paths.
 const TABLE: &str = "trajectories";
@@ -96,20 +95,11 @@ pub(super) fn export(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     let features: Vec<Value> =
         paths.iter().map(|(airplane, path)| path.feature(*airplane, has_date)).collect();
     let collection = json!({ "type": "FeatureCollection", "features": features });
-    let path = target.path();
-    let partial = partial_path(path);
-    let written = File::create(&partial).and_then(|file| {
-        let mut out = BufWriter::new(file);
-        serde_json::to_writer(&mut out, &collection)?;
-        out.write_all(b"\n")?;
-        out.into_inner().map_err(|e| e.into_error())?.sync_all()?;
-        std::fs::rename(&partial, path)
-    });
-    if let Err(e) = written {
-        let _ = std::fs::remove_file(&partial);
-        return Err(Error::cannot_write(path, &e));
-    }
-    Ok(ExportResult::single_file(path, false))
+    target.write_stream(|out| {
+        serde_json::to_writer(&mut *out, &collection)?;
+        out.write_all(b"\n")
+    })?;
+    Ok(ExportResult::single_file(target.path(), false))
 }
 
 fn not_on_earth(job: &ExportContext<'_>) -> Error {

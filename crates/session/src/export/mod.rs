@@ -175,7 +175,7 @@ impl ExportContext<'_> {
 
 fn export_mcap(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     let ExportContext { recorded, wanted, span, .. } = job;
-    let target = Target::for_file(job, ".mcap")?;
+    let target = Target::for_mcap(job)?;
     let resolved = recorded.resolved_scenario()?;
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);
@@ -190,9 +190,7 @@ fn export_mcap(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
 
 fn export_bag(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     let ExportContext { recorded, wanted, span, .. } = job;
-    // The endings of all files of a bag: recording, metadata and map, and description of the map. A folder to be
-    // replaced may hold nothing else, so a kind of file that bags get later belongs here, too.
-    let target = Target::for_folder(job, "-rosbag", &["mcap", "yaml", "pgm"])?;
+    let target = Target::for_folder(job, "-rosbag")?;
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);
     let is_confirmed = target.write_folder(|folder| {

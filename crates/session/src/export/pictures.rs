@@ -3,7 +3,6 @@
 use super::target::Target;
 use super::{AnimationOptions as Options, ExportContext, ExportResult};
 use crate::driver::Sinks;
-use crate::files::write_atomically;
 use crate::frame_sink::{AnimationFrames, write_gif};
 use crate::picture::{draw_svg, footnote};
 use crate::watcher::{Progress, ProgressGuard};
@@ -48,14 +47,15 @@ fn export_picture(
     let origin = format!("Cycle {}. {}", run.cycle(), footnote(run.as_ref()));
     let svg = draw_svg(run.as_mut(), job.recorded.folder.as_deref(), &origin)?;
     let bytes = encode(svg)?;
-    write_atomically(target.path(), |file| file.write_all(&bytes))?;
+    target.write_stream(|file| file.write_all(&bytes))?;
     Ok(ExportResult::single_file(target.path(), is_confirmed))
 }
 
 pub(super) fn export_gif(job: &ExportContext<'_>, options: Options) -> Result<ExportResult, Error> {
     let target = Target::for_file(job, ".gif")?;
     export_animation(job, options, &target, |animation| {
-        animation.write_gif(options.width_px.unwrap_or(DEFAULT_GIF_WIDTH_PX), target.path())
+        let width_px = options.width_px.unwrap_or(DEFAULT_GIF_WIDTH_PX);
+        animation.write_gif(width_px, &target)
     })
 }
 
@@ -63,7 +63,7 @@ pub(super) fn export_frames(
     job: &ExportContext<'_>,
     options: Options,
 ) -> Result<ExportResult, Error> {
-    let target = Target::for_folder(job, "-frames", &["png"])?;
+    let target = Target::for_folder(job, "-frames")?;
     export_animation(job, options, &target, |animation| {
         let width_px = options.width_px.unwrap_or(DEFAULT_FRAME_WIDTH_PX);
         target.write_folder(|folder| animation.write_frames(width_px, folder))
@@ -106,14 +106,14 @@ struct Animation<'a> {
 }
 
 impl Animation<'_> {
-    fn write_gif(&self, width_px: u16, to: &Path) -> Result<(), Error> {
+    fn write_gif(&self, width_px: u16, to: &Target) -> Result<(), Error> {
         let view = self.pictures.view(width_px.into())?;
         let watched = ProgressGuard(self.watcher);
         let pixels = (0..self.pictures.len()).map(|index| {
             let picture = self.draw(&view, index, &watched).map_err(std::io::Error::other)?;
             Ok(picture.rgba().to_vec())
         });
-        write_atomically(to, |file| write_gif(file, view.size_px(), f64::from(self.fps), pixels))
+        to.write_stream(|file| write_gif(file, view.size_px(), f64::from(self.fps), pixels))
     }
 
     fn write_frames(&self, width_px: u16, folder: &Path) -> Result<(), Error> {

@@ -10,7 +10,7 @@ use sidestep_record::{Table, TableFileWriter, for_each_block, tables};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Name of the table of which every row is kept, regardless of `every`.
 const EVENTS: &str = "events";
@@ -39,12 +39,12 @@ pub(super) fn export(
         Some(name) => {
             source.check_table(name)?;
             let target = Target::for_file(job, &format!("-{name}.{ending}"))?;
-            source.write(name, target.path())?;
+            target.write_file(|partial| source.write(name, partial))?;
             vec![target.path().to_path_buf()]
         }
         None => {
             let names = tables(source.folder)?;
-            let target = Target::for_folder(job, &format!("-{ending}"), &[ending, "csv"])?;
+            let target = Target::for_folder(job, &format!("-{ending}"))?;
             target.write_folder(|partial| {
                 for name in &names {
                     source.write(name, &partial.join(format!("{name}.{ending}")))?;
@@ -143,26 +143,15 @@ impl<'a> TableExport<'a> {
     }
 
     fn write_csv(&self, name: &str, to: &Path) -> Result<(), Error> {
-        let partial = partial_path(to);
-        let written = self
-            .fill_csv(name, &partial)
-            .and_then(|()| std::fs::rename(&partial, to).map_err(|e| Error::cannot_write(to, &e)));
-        if written.is_err() {
-            let _ = std::fs::remove_file(&partial);
-        }
-        written
-    }
-
-    fn fill_csv(&self, name: &str, partial: &Path) -> Result<(), Error> {
-        let file = File::create(partial).map_err(|e| Error::cannot_write(partial, &e))?;
+        let file = File::create_new(to).map_err(|e| Error::cannot_write(to, &e))?;
         let mut csv = csv::Writer::from_writer(BufWriter::new(file));
         let mut has_heading = false;
         self.for_each_block_of(name, |block| {
             let written = append_block(&mut csv, &block, !has_heading);
             has_heading = true;
-            written.map_err(|e| Error::cannot_write(partial, &io::Error::from(e)))
+            written.map_err(|e| Error::cannot_write(to, &io::Error::from(e)))
         })?;
-        close(csv).map_err(|e| Error::cannot_write(partial, &e))
+        close(csv).map_err(|e| Error::cannot_write(to, &e))
     }
 }
 
@@ -182,12 +171,6 @@ fn close(csv: csv::Writer<BufWriter<File>>) -> io::Result<()> {
     let buffer = csv.into_inner().map_err(|e| e.into_error())?;
     let file = buffer.into_inner().map_err(|e| e.into_error())?;
     file.sync_all()
-}
-
-pub(super) fn partial_path(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".partial");
-    name.into()
 }
 
 /// Keeps rows of cycles that are multiples of `every`.

@@ -1,17 +1,20 @@
 //! The place of an export.
 
 use super::ExportContext;
-use crate::Error;
-use crate::files::resolve_path;
+use crate::files::{resolve_path, write_file};
+use crate::{Error, VERSION};
 use sidestep_kernel::InputError;
-use sidestep_record::resolve_link;
+use sidestep_record::{EXPORT, ExportFolder, FileManifest, FileSet, IfExists, McapRecorder};
 use std::ffi::OsStr;
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 /// A file or folder that does not exist yet, or may be replaced.
 #[derive(Debug)]
 pub(super) struct Target {
     path: PathBuf,
+    existing: IfExists,
 }
 
 impl Target {
@@ -22,7 +25,8 @@ impl Target {
     fn resolve(job: &ExportContext<'_>, ending: &str) -> Result<Self, InputError> {
         let recorded = &job.recorded.path;
         let path = job.wanted.out.map_or_else(|| default_path(recorded, ending), Path::to_path_buf);
-        let target = Self { path };
+        let existing = if job.wanted.replace { IfExists::Replace } else { IfExists::Refuse };
+        let target = Self { path, existing };
         if resolve_path(recorded).starts_with(resolve_path(&target.path)) {
             let cause = "this is the recording that is exported, or holds it";
             return Err(target.error(cause, "give another place with --out"));
@@ -36,39 +40,47 @@ impl Target {
     /// When the file exists and may not be replaced.
     pub(super) fn for_file(job: &ExportContext<'_>, ending: &str) -> Result<Self, InputError> {
         let target = Self::resolve(job, ending)?;
-        match std::fs::metadata(&target.path) {
-            Ok(found) if found.is_dir() => Err(target.error("this is a folder", "give a file")),
-            Ok(_) if !job.wanted.replace => Err(target.error(EXISTS_CAUSE, REPLACE_REMEDY)),
-            _ => Ok(target),
-        }
+        target.file_set()?;
+        Ok(target)
     }
 
-    /// Returns a folder; one that is replaced may hold only files with an extension in `holds`.
+    /// Returns the requested recording, or the run's name with `.mcap`. It has no list: it confirms itself.
     ///
     /// # Errors
-    /// When the folder exists and may not be replaced, or holds something else.
-    pub(super) fn for_folder(
-        job: &ExportContext<'_>,
-        ending: &str,
-        holds: &[&str],
-    ) -> Result<Self, InputError> {
-        let target = Self::resolve(job, ending)?;
-        let Ok(mut entries) = std::fs::read_dir(&target.path) else {
-            if target.path.exists() {
-                return Err(target.error("this is no folder", "give a new folder"));
-            }
-            return Ok(target);
-        };
-        if !job.wanted.replace {
-            return Err(target.error(EXISTS_CAUSE, REPLACE_REMEDY));
-        }
-        // A mistyped --out must not cost a folder of somebody's own files.
-        if !entries.all(|entry| entry.is_ok_and(|entry| has_extension(&entry.path(), holds))) {
-            let listed = holds.join(", .");
-            let cause = format!("the folder holds something else than .{listed} files");
-            return Err(target.error(&cause, "give a new folder"));
-        }
+    /// When the file exists and may not be replaced.
+    pub(super) fn for_mcap(job: &ExportContext<'_>) -> Result<Self, InputError> {
+        let target = Self::resolve(job, ".mcap")?;
+        McapRecorder::check_vacant(&target.path, target.existing)?;
         Ok(target)
+    }
+
+    /// Returns a folder.
+    ///
+    /// # Errors
+    /// When the folder exists and may not be replaced.
+    pub(super) fn for_folder(job: &ExportContext<'_>, ending: &str) -> Result<Self, InputError> {
+        let target = Self::resolve(job, ending)?;
+        ExportFolder::check(&target.path, target.existing)?;
+        Ok(target)
+    }
+
+    /// Returns the file and its list, not yet written.
+    ///
+    /// # Errors
+    /// When the file exists and may not be replaced.
+    fn file_set(&self) -> Result<FileSet, InputError> {
+        let name = self.name();
+        let found = std::fs::symlink_metadata(&self.path);
+        if self.existing == IfExists::Refuse && found.is_ok_and(|found| found.is_file()) {
+            return Err(self.error(EXISTS_CAUSE, REPLACE_REMEDY));
+        }
+        let set = FileSet::new(&FileManifest::beside(&self.path), EXPORT, VERSION)?;
+        set.check(&name)?;
+        Ok(set)
+    }
+
+    fn name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
     fn error(&self, cause: &str, remedy: &str) -> InputError {
@@ -77,6 +89,33 @@ impl Target {
 
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Creates the file and its list: `fill` gets another name, under which the file has to be whole and on the disk.
+    ///
+    /// # Errors
+    /// The error of `fill`, or an I/O error; nothing is left then.
+    pub(super) fn write_file<T>(
+        &self,
+        fill: impl FnOnce(&Path) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let mut set = self.file_set()?;
+        let filled = set.stage(&self.name(), fill)?;
+        set.commit()?;
+        Ok(filled)
+    }
+
+    /// Creates the file from what `write` writes, and its list.
+    ///
+    /// # Errors
+    /// An I/O error; nothing is left then.
+    pub(super) fn write_stream(
+        &self,
+        write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+    ) -> Result<(), Error> {
+        self.write_file(|partial| {
+            write_file(partial, write).map_err(|e| Error::cannot_write(&self.path, &e))
+        })
     }
 
     /// Creates the folder: `fill` gets one with another name, which replaces the folder
@@ -88,40 +127,15 @@ impl Target {
         &self,
         fill: impl FnOnce(&Path) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let cannot_write = |e: std::io::Error| Error::cannot_write(&self.path, &e);
-        // A link stays: the folder that it leads to is replaced.
-        let path = resolve_link(&self.path).map_err(cannot_write)?;
-        let mut partial = path.as_os_str().to_owned();
-        partial.push(".partial");
-        let partial = PathBuf::from(partial);
-        // Remains of a process that was killed.
-        remove(&partial).map_err(cannot_write)?;
-        std::fs::create_dir_all(&partial).map_err(cannot_write)?;
-        let filled = fill(&partial).and_then(|filled| {
-            remove(&path).and_then(|()| std::fs::rename(&partial, &path)).map_err(cannot_write)?;
-            Ok(filled)
-        });
-        if filled.is_err() {
-            let _ = remove(&partial);
-        }
-        filled
+        let folder = ExportFolder::create(&self.path, self.existing)?;
+        let filled = fill(folder.path())?;
+        folder.commit(VERSION)?;
+        Ok(filled)
     }
-}
-
-fn has_extension(path: &Path, extensions: &[&str]) -> bool {
-    let extension = path.extension();
-    path.is_file() && extensions.iter().any(|one| extension == Some(OsStr::new(one)))
 }
 
 const EXISTS_CAUSE: &str = "is there already";
 const REPLACE_REMEDY: &str = "give another place with --out, or --replace";
-
-fn remove(folder: &Path) -> std::io::Result<()> {
-    match std::fs::remove_dir_all(folder) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        other => other,
-    }
-}
 
 /// Returns the place beside a recording, with its name.
 fn default_path(recorded: &Path, ending: &str) -> PathBuf {

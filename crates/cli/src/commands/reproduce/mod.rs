@@ -15,8 +15,6 @@ use sidestep_document::claim::{Claim, verdict_summary};
 use sidestep_document::document::Picture;
 use sidestep_draw::{DrawError, PictureOptions, Style, draw};
 use sidestep_papers::Scene;
-use sidestep_session::write_atomically;
-use std::io::Write;
 use std::path::Path;
 
 const EXAMPLES: &str = "\
@@ -91,9 +89,10 @@ fn store_and_print(
     if let Some(folder) = out {
         let json = serde_json::to_vec_pretty(report).expect("a report is plain data");
         let files = ReportFiles { html: folder.join("report.html"), pictures: "figures".into() };
-        std::fs::create_dir_all(folder).map_err(|e| Failure::cannot_write(folder, &e))?;
-        write_atomically(&folder.join("report.json"), |file| file.write_all(&json))?;
-        files.store(&outcome.document, PngOutput::AlsoPng)?;
+        let mut listed = files.begin()?;
+        listed.stage_bytes::<Failure>("report.json", &json)?;
+        files.add(&mut listed, &outcome.document, PngOutput::AlsoPng)?;
+        listed.commit()?;
     }
     console.print_result(report, || summary(outcome, out))?;
     Ok(ExitCode::Done)

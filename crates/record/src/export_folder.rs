@@ -1,0 +1,93 @@
+//! The folder of an export: filled under a temporary name, then listed and moved to its place in one step.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sidestep_kernel::InputError;
+
+use crate::disk;
+use crate::file_manifest::{EXPORT, FileManifest};
+use crate::folder::IfExists;
+use crate::replacement::Replacement;
+use crate::run_content::{list_tree, slashed};
+use crate::staging::StagingFolder;
+
+/// A folder that is filled. If it is dropped before it is [committed](Self::commit), it is deleted.
+pub struct ExportFolder {
+    target: PathBuf,
+    staging: StagingFolder,
+    existing: IfExists,
+}
+
+impl ExportFolder {
+    /// Returns the name of the list of files in such a folder.
+    pub fn list_name() -> String {
+        FileManifest::name_for(EXPORT)
+    }
+
+    /// Refuses a place where such a folder may not be made.
+    ///
+    /// # Errors
+    /// Something is there, and may not be replaced: no folder, or one that has no list of its files, or in which one of
+    /// them was changed.
+    pub fn check(target: &Path, existing: IfExists) -> Result<(), InputError> {
+        Self::find_old(target, existing).map(drop)
+    }
+
+    /// Returns what may be deleted of the folder that is there, and what stays.
+    fn find_old(target: &Path, existing: IfExists) -> Result<Replacement, InputError> {
+        let Ok(mut entries) = fs::read_dir(target) else {
+            if target.exists() {
+                let remedy = "give a new folder";
+                return Err(InputError::new(target.display(), "this is no folder", remedy));
+            }
+            return Ok(Replacement::default());
+        };
+        match existing {
+            IfExists::Refuse => {
+                let remedy = "give another place with --out, or --replace";
+                Err(InputError::new(target.display(), "is there already", remedy))
+            }
+            IfExists::Replace if entries.next().is_none() => Ok(Replacement::default()),
+            IfExists::Replace => Replacement::of_export(target),
+        }
+    }
+
+    /// Begins a folder that will be at `target`.
+    ///
+    /// # Errors
+    /// Those of [`Self::check`]; a place where none can be made.
+    pub fn create(target: &Path, existing: IfExists) -> Result<Self, InputError> {
+        Self::check(target, existing)?;
+        let staging = StagingFolder::new(target)?;
+        Ok(Self { target: target.to_path_buf(), staging, existing })
+    }
+
+    /// Returns the path under which it is filled.
+    pub fn path(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Lists all files and moves the folder to its place. Files that the earlier folder listed are deleted, all others are in
+    /// the new one afterwards.
+    ///
+    /// # Errors
+    /// Those of [`Self::check`]; another file that has the name of a new one; an I/O error. The earlier folder stays.
+    pub fn commit(self, program_version: &str) -> Result<(), InputError> {
+        let folder = self.staging.path();
+        self.write_list(program_version)
+            .and_then(|()| Ok(disk::sync_below(folder)?))
+            .map_err(|cause| disk::cannot_create(&self.target, cause))?;
+        let old = Self::find_old(&self.target, self.existing)?;
+        self.staging.commit(&old)
+    }
+
+    fn write_list(&self, program_version: &str) -> Result<(), Box<dyn std::error::Error>> {
+        let folder = self.staging.path();
+        let mut list = FileManifest::new(EXPORT, program_version);
+        for path in list_tree(folder)? {
+            list.files.insert_file(folder, &slashed(&path))?;
+        }
+        Ok(list.write(&folder.join(Self::list_name()))?)
+    }
+}
