@@ -95,6 +95,8 @@ impl RunFolder {
     ) -> Result<Self, InputError> {
         check_vacant(path, existing)?;
         let staging = StagingFolder::new(path)?;
+        // Once its parents are made, a path with `..` may lead to a folder that could not be seen before.
+        check_vacant(path, existing)?;
         let Provenance { program_version, scenario, seed } = &run.origin;
         let mut manifest = Manifest {
             build: Some(run.build.clone()),

@@ -164,8 +164,13 @@ fn a_recording_for_viewers_is_replaced_only_if_it_is_ours_and_whole() {
     assert_eq!(place.read("r.mcap.partial"), "mine");
     // As a killed process leaves it.
     place.write("r.mcap.partial", &whole[..whole.len() / 2]);
-    let refused = place.run(&["run", "s.toml", "--mcap", "new/../r.mcap"]);
-    assert_eq!(refused.code(), 2, "what was recorded is not overwritten unasked");
+    for path in ["r.mcap", "new/../r.mcap"] {
+        let refused = place.run(&["run", "s.toml", "--cycles", "10", "--mcap", path]);
+        assert_eq!(refused.code(), 2, "what was recorded is not overwritten unasked");
+    }
+    let refused = place.run(&["run", "s.toml", "--cycles", "10", "--out", "new/../r"]);
+    assert_eq!(refused.code(), 2, "{}", refused.err());
+    assert!(!place.path("new").exists());
     assert_eq!(place.run(&again).code(), 0);
     assert!(!place.path("r.mcap.partial").exists());
 }

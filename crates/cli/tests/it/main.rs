@@ -14,6 +14,7 @@ mod exact;
 mod export;
 mod fk;
 mod fleet;
+mod flips;
 mod foxglove;
 mod help;
 mod hints;

@@ -5,7 +5,8 @@ use crate::support::{CommandOutput, TestFolder, names, requires, signal, wait_fo
 use serde_json::Value;
 
 /// The names in the folder of a report.
-const WHOLE: [&str; 4] = ["figures", "report.html", "report.json", "report.md"];
+const WHOLE: [&str; 5] =
+    ["figures", "report.html", "report.json", "report.manifest.json", "report.md"];
 
 #[test]
 fn a_rehearsal_leaves_a_whole_report() {

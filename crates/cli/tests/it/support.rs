@@ -137,7 +137,7 @@ impl CommandOutput {
 }
 
 /// Waits until `ready` holds.
-pub(crate) fn wait_for(what: &str, ready: impl Fn() -> bool) {
+pub(crate) fn wait_for(what: &str, mut ready: impl FnMut() -> bool) {
     let started = Instant::now();
     while !ready() {
         assert!(started.elapsed() < Duration::from_secs(60), "waited too long for {what}");

@@ -82,6 +82,13 @@ impl McapRecorder {
             let remedy = "give a new file";
             return Err(InputError::new(path.display(), "this is no file name", remedy));
         }
+        let is_back = path.components().any(|part| part == std::path::Component::ParentDir);
+        if is_back && !disk::parent(path).exists() {
+            // Once the folder is made, the path may lead to a file that cannot be seen now.
+            let cause = "a folder of this path is not there";
+            let remedy = "give the path without `..`";
+            return Err(InputError::new(path.display(), cause, remedy));
+        }
         let remains = disk::partial_path(path);
         for (place, is_whole) in [(path, true), (&*remains, false)] {
             let Ok(found) = fs::symlink_metadata(place) else { continue };

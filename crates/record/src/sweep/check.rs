@@ -87,7 +87,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Returns whether a path in the folder is what a process leaves that is killed, or an empty folder of a sweep.
     pub(crate) fn is_remains(name: &str) -> bool {
         let whole = name.strip_suffix(".partial").unwrap_or(name);
-        let is_share = name.starts_with(SHARES) && whole != name;
+        let is_share = name.starts_with(SHARES) && (whole != name || name.ends_with(".lock"));
         let is_table = [CELLS, RESULTS, TIMINGS].contains(&whole);
         let is_folder = [SHARES, VARIANTS, RUNS, TEMP_FOLDER].contains(&name);
         is_share

@@ -102,6 +102,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
         }
         check_vacant(path, crate::IfExists::Refuse)?;
         let staging = StagingFolder::new(path)?;
+        check_vacant(path, crate::IfExists::Refuse)?;
         let (plan, fingerprints, cells) = fill(staging.path())?;
         make_folder(&staging.path().join(SHARES))?;
         let cells: Vec<_> = cells.iter().collect();

@@ -13,7 +13,7 @@ use sidestep_kernel::view::{
 };
 use sidestep_record::{
     IfExists, McapFooter, McapProvenance, McapRecorder, McapRunInfo, McapSceneReader, Status,
-    is_mcap,
+    check_mcap, is_mcap,
 };
 
 use crate::support::{names, origin};
@@ -164,13 +164,38 @@ fn an_existing_file_is_kept_unless_it_is_to_be_replaced() {
     assert!(McapRecorder::check_vacant(&path, IfExists::Refuse).is_ok());
     std::fs::write(&path, "mine").unwrap();
     assert!(McapRecorder::check_vacant(&path, IfExists::Refuse).is_err());
-    assert!(McapRecorder::check_vacant(&path, IfExists::Replace).is_ok());
+    assert!(McapRecorder::check_vacant(&path, IfExists::Replace).is_err(), "it is of others");
     assert!(McapRecorder::check_vacant(folder.path(), IfExists::Replace).is_err());
     // Until the new one is whole, the old one stays.
     let recorder = started(&path);
     assert_eq!(std::fs::read(&path).unwrap(), b"mine");
     recorder.finish(&end(Status::Complete)).unwrap();
     assert!(is_mcap(&path));
+    assert!(McapRecorder::check_vacant(&path, IfExists::Refuse).is_err());
+    assert!(McapRecorder::check_vacant(&path, IfExists::Replace).is_ok());
+    let link = folder.path().join("link.mcap");
+    std::os::unix::fs::symlink(&path, &link).unwrap();
+    assert!(McapRecorder::check_vacant(&link, IfExists::Replace).is_err());
+}
+
+#[test]
+fn every_flipped_bit_of_a_recording_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    started(&path).finish(&end(Status::Complete)).unwrap();
+    check_mcap(&path).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    // Every byte once, and in the end all bits of each.
+    for bit in
+        (0..whole.len()).map(|at| 8 * at + at % 8).chain(8 * (whole.len() - 50)..8 * whole.len())
+    {
+        let mut flipped = whole.clone();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        std::fs::write(&path, &flipped).unwrap();
+        assert!(check_mcap(&path).is_err(), "bit {bit} of {}", whole.len() * 8);
+    }
+    std::fs::write(&path, [&whole[..], b"more"].concat()).unwrap();
+    assert!(check_mcap(&path).is_err(), "more bytes than were written");
 }
 
 #[test]
