@@ -121,9 +121,9 @@ fn append_chunks(
     let mut checksum = crc32fast::Hasher::new();
     let mut group = file.next_row_group()?;
     for column in columns {
-        let (bytes, closed) = column.take_chunk()?;
-        checksum.update(&bytes);
-        group.append_column(&bytes, closed)?;
+        let chunk = column.take_chunk()?;
+        checksum.combine(&chunk.checksum);
+        group.append_column(&chunk.bytes, chunk.closed)?;
     }
     group.close()?;
     // Detects a full disk now, not only at the next row group.

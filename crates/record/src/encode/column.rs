@@ -2,15 +2,13 @@
 
 use std::ops::Range;
 
-use bytes::Bytes;
 use parquet::basic::Encoding;
-use parquet::column::writer::ColumnCloseResult;
 use parquet::errors::Result;
 use parquet::file::statistics::Statistics;
 use parquet::schema::types::ColumnDescPtr;
 use sidestep_kernel::ports::{ColumnSpec, ColumnType, ColumnValues};
 
-use super::chunk::put_text;
+use super::chunk::{ClosedChunk, put_text};
 use super::delta::DeltaEncoder;
 use super::labels::LabelEncoder;
 use super::{ColumnChunk, PAGE_ROWS};
@@ -122,7 +120,7 @@ impl ColumnEncoder {
     }
 
     /// Ends the row group's chunk and returns it; the next one starts empty.
-    pub(crate) fn take_chunk(&mut self) -> Result<(Bytes, ColumnCloseResult)> {
+    pub(crate) fn take_chunk(&mut self) -> Result<ClosedChunk> {
         if self.rows_in_page > 0 {
             self.end_page()?;
         }

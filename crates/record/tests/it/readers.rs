@@ -44,6 +44,41 @@ fn pyarrow_reads_a_folder_of_parts_as_one_table() {
     );
 }
 
+/// Reads a table with checksums of pages, and prints whether they are right.
+const CHECK: &str = "
+import sys, pyarrow.parquet as pq
+try:
+    print(pq.read_table(sys.argv[1], page_checksum_verification=True).num_rows)
+except OSError as error:
+    print(error)
+";
+
+#[test]
+fn pyarrow_notices_a_flipped_bit_in_a_page_by_its_checksum() {
+    let python = sidestep_testing::python();
+    let has_pyarrow = Command::new(&python).args(["-c", "import pyarrow.parquet"]).output();
+    if !has_pyarrow.is_ok_and(|o| o.status.success()) {
+        sidestep_testing::skip(format!("{} has no pyarrow", python.display()));
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut recorder = recorder(folder.path());
+    recorder.append(0, &rows(0, 500)).unwrap();
+    recorder.finish().unwrap();
+    let part = folder.path().join("trajectories/part-000000000000000.parquet");
+    let read = || {
+        let output = Command::new(&python).args(["-c", CHECK]).arg(&part).output().unwrap();
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    assert_eq!(read().trim(), "1000");
+    let whole = std::fs::read(&part).unwrap();
+    // Doubles in the middle of the file, any bits of which are a number.
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 3] ^= 1;
+    std::fs::write(&part, flipped).unwrap();
+    assert!(read().to_lowercase().contains("crc"), "{}", read());
+}
+
 /// The second line of the script, from the rows themselves.
 fn sums() -> String {
     let cycles: u64 = (0..1000).sum();
