@@ -55,6 +55,7 @@ fn rounds(team: u32, rounds: usize) {
             agent,
             incarnation: Incarnation(0),
             listens: vec![held.endpoint.clone()],
+            session: None,
         })
         .collect();
     drop(held);

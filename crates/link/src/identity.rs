@@ -7,6 +7,7 @@ use sidestep_session::fleet::AgentName;
 use std::fmt;
 use std::path::Path;
 use x509_parser::pem::Pem;
+use x509_parser::prelude::X509Certificate;
 
 /// The common name of a server.
 pub const SERVER_NAME: &str = "server";
@@ -69,7 +70,11 @@ impl fmt::Display for CertificateName {
 pub fn common_name(file: &Path) -> Option<String> {
     let text = std::fs::read(file).ok()?;
     let pem = Pem::iter_from_buffer(&text).next()?.ok()?;
-    let certificate = pem.parse_x509().ok()?;
+    name_in_certificate(&pem.parse_x509().ok()?)
+}
+
+/// Returns the common name in a certificate; `None` if there is none.
+pub(crate) fn name_in_certificate(certificate: &X509Certificate<'_>) -> Option<String> {
     let name = certificate.subject().iter_common_name().next()?;
     Some(name.as_str().ok()?.to_string())
 }

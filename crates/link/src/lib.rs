@@ -6,6 +6,7 @@
 //! protocol.rs        messages between peers, and the frames that carry them
 //! arq.rs             reliable delivery to one peer: numbered, acknowledged, retransmitted
 //! identity.rs        whom a certificate stands for
+//! signature.rs       signatures of frames that the server relays
 //! messenger.rs       a peer's reliable and best-effort messages to and from all other peers
 //! agent.rs           the interface of an agent's program, of its percepts, controls and packets
 //! distributed.rs     the interface of a world whose agents are processes
@@ -35,5 +36,6 @@ pub mod protocol;
 mod recent_senders;
 mod replay_window;
 pub mod server;
+pub mod signature;
 pub mod wire;
 pub mod worlds;

@@ -1,10 +1,14 @@
 //! A peer's messages to and from all others over one wire: best-effort ones, which may be lost, and reliable ones.
 
 use crate::arq::ArqLink;
-use crate::protocol::{FleetMember, Incarnation, Message, RecipientHeader, TransportFrame};
+use crate::protocol::{
+    FleetMember, Incarnation, Message, RecipientHeader, SessionCertificate, TransportFrame,
+};
 use crate::replay_window::ReplayWindow;
+use crate::signature::{ForgedFrame, KnownKeys, SessionKey};
 use crate::wire::{PeerId, Wire, WireSetupError};
 use sidestep::kernel::EntityId;
+use sidestep_session::fleet::Tls;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::Arc;
@@ -99,6 +103,10 @@ pub struct Messenger {
     /// The peers with which it has connected.
     peers: BTreeMap<PeerId, PeerState>,
     stats: MessengerStats,
+    /// The key by which it signs what other nodes receive; none without certificates, and of the server.
+    session_key: Option<SessionKey>,
+    /// The keys by which other nodes sign; none without certificates.
+    known_keys: Option<KnownKeys>,
 }
 
 impl Messenger {
@@ -114,7 +122,56 @@ impl Messenger {
             listened_at: Duration::ZERO,
             peers: BTreeMap::new(),
             stats: MessengerStats::default(),
+            session_key: None,
+            known_keys: None,
         }
+    }
+
+    /// Makes it believe nodes only by keys that their certificates have signed, and, if it is a node, sign what it sends
+    /// to others. The agents' certificates have the given common names, by their ids.
+    ///
+    /// # Errors
+    /// When a file of certificates cannot be read.
+    pub fn with_signatures(mut self, tls: &Tls, names: Vec<String>) -> Result<Self, String> {
+        self.known_keys = Some(KnownKeys::new(tls, names)?);
+        if let PeerId::Node(agent) = self.me {
+            self.session_key = Some(SessionKey::new(tls, agent, self.incarnation)?);
+        }
+        Ok(self)
+    }
+
+    /// Returns the key by which it signs, for others; none where it does not.
+    pub fn session(&self) -> Option<SessionCertificate> {
+        self.session_key.as_ref().map(|key| key.certificate().clone())
+    }
+
+    /// Checks that the key of a node is its own, where there are certificates.
+    ///
+    /// # Errors
+    /// With the reason why nobody can tell.
+    pub fn check_session(
+        &self,
+        agent: EntityId,
+        incarnation: Incarnation,
+        session: Option<&SessionCertificate>,
+    ) -> Result<(), String> {
+        let Some(known) = &self.known_keys else { return Ok(()) };
+        known.check(agent, incarnation, session)
+    }
+
+    /// Connects with another node, and returns whether it has: not where there are certificates and its key is not its own.
+    pub fn connect_member(&mut self, member: &FleetMember) -> bool {
+        if let Some(known) = &mut self.known_keys {
+            let session = member.session.as_ref();
+            if let Err(reason) = known.learn(member.agent, member.incarnation, session) {
+                self.count_drop(drop_reason::FORGED);
+                let agent = member.agent;
+                tracing::warn!(agent, reason, "a node is not believed");
+                return false;
+            }
+        }
+        self.connect(PeerId::Node(member.agent), member.incarnation);
+        true
     }
 
     /// Returns the peer's own incarnation.
@@ -243,7 +300,12 @@ impl Messenger {
         self.next_number += 1;
         let from = self.me;
         let incarnation = self.incarnation;
-        let frame = TransportFrame { from, incarnation, number, to, message }.encode();
+        let mut frame = TransportFrame { from, incarnation, number, to, message }.encode();
+        if let Some(key) = &self.session_key
+            && is_signed(from, &peers)
+        {
+            frame = key.sign(frame);
+        }
         self.stats.frames += 1;
         self.stats.bytes += frame.len() as u64;
         self.wire.send(&peers, &frame);
@@ -361,7 +423,36 @@ impl Messenger {
         }
     }
 
+    /// Returns a frame without its signature, where it must have one; an error is the reason why it is not believed.
+    fn open_frame<'a>(&self, bytes: &'a [u8]) -> Result<&'a [u8], &'static str> {
+        let Some(known) = &self.known_keys else { return Ok(bytes) };
+        let Some((from, incarnation)) = TransportFrame::sender_process(bytes) else {
+            // To be counted as what it is instead.
+            return Ok(bytes);
+        };
+        let PeerId::Node(agent) = from else { return Ok(bytes) };
+        if !is_signed(from, &[self.me]) {
+            return Ok(bytes);
+        }
+        match known.open((agent, incarnation), bytes) {
+            Ok(Some(frame)) => Ok(frame),
+            Ok(None) => Err(drop_reason::STRANGER),
+            Err(ForgedFrame) => Err(drop_reason::FORGED),
+        }
+    }
+
     fn decode_frame(&mut self, bytes: &[u8]) -> Option<ReceivedMessage> {
+        let bytes = match self.open_frame(bytes) {
+            Ok(bytes) => bytes,
+            Err(drop_reason::STRANGER) => {
+                self.count_drop(drop_reason::STRANGER);
+                return None;
+            }
+            Err(reason) => {
+                self.count_bad_frame(reason);
+                return None;
+            }
+        };
         let frame = match TransportFrame::decode(bytes) {
             Ok(frame) => frame,
             Err(reason) => {
@@ -422,6 +513,12 @@ impl Messenger {
             _ => Ok(()),
         }
     }
+}
+
+/// Returns whether a frame has a signature, where there are certificates: one from a node to other nodes, which the server
+/// may relay. No frame is for nodes and the server.
+fn is_signed(from: PeerId, to: &[PeerId]) -> bool {
+    from != PeerId::Server && !to.contains(&PeerId::Server)
 }
 
 /// Returns a random number, so that no two processes of a peer share it.

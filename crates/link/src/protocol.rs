@@ -12,7 +12,7 @@ use sidestep::kernel::{Cycle, EntityId};
 pub use sidestep_session::fleet::{ClockMode, Topology};
 
 /// First bytes of every frame: `Sk`, and the version of the format.
-const MAGIC: [u8; 3] = [b'S', b'k', 4];
+const MAGIC: [u8; 3] = [b'S', b'k', 5];
 
 /// Bytes of the digest at the end of a frame: of 10^9 damaged ones, all are noticed but for a chance of 1 in 10^10.
 const DIGEST_BYTES: usize = 8;
@@ -109,6 +109,8 @@ pub struct JoinRequest {
     pub listens: Vec<String>,
     /// Its process id on its machine.
     pub process: u32,
+    /// The key by which it signs what other nodes receive; none without certificates.
+    pub session: Option<SessionCertificate>,
 }
 
 /// A digest of a scenario and its files, in hexadecimal digits: two processes that differ in it would simulate
@@ -146,6 +148,21 @@ pub struct FleetMember {
     pub incarnation: Incarnation,
     /// Endpoints at which it is reached.
     pub listens: Vec<String>,
+    /// The key by which it signs what other nodes receive; none without certificates.
+    pub session: Option<SessionCertificate>,
+}
+
+/// The public key by which a node's process signs its frames, and who says that it is (`signature.rs`).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SessionCertificate {
+    /// The public key: Ed25519.
+    pub key: [u8; 32],
+    /// The node's certificate, and those between it and the authority (DER).
+    pub chain: Vec<Vec<u8>>,
+    /// The kind of the signature, by its number in TLS.
+    pub scheme: u16,
+    /// The signature of the certificate's key: over the agent, the incarnation and the public key.
+    pub signature: Vec<u8>,
 }
 
 /// The start of a cycle for a node, or of its agent's round where agents decide one after the other.
@@ -278,6 +295,11 @@ impl<M: Serialize> TransportFrame<M> {
 impl TransportFrame {
     /// Returns the sender that a frame names, without reading the rest; `None` for another text.
     pub fn sender(bytes: &[u8]) -> Option<PeerId> {
+        Self::sender_process(bytes).map(|(sender, _)| sender)
+    }
+
+    /// Returns the sender that a frame names, with its incarnation; `None` for another text.
+    pub fn sender_process(bytes: &[u8]) -> Option<(PeerId, Incarnation)> {
         let body = bytes.strip_prefix(&MAGIC)?;
         postcard::take_from_bytes(body).ok().map(|(sender, _)| sender)
     }

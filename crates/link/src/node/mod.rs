@@ -314,9 +314,9 @@ impl Node {
             if member.agent == self.agent || self.members.contains(member) {
                 continue;
             }
-            let peer = PeerId::Node(member.agent);
-            self.messenger.connect(peer, member.incarnation);
-            self.messenger.send_reliable(peer, Message::Hello);
+            if self.messenger.connect_member(member) {
+                self.messenger.send_reliable(PeerId::Node(member.agent), Message::Hello);
+            }
         }
         self.members = members;
         Ok(())

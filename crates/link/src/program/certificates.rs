@@ -2,6 +2,7 @@
 
 use crate::distributed::DistributedWorld;
 use crate::identity::{CertificateName, common_name};
+use crate::messenger::Messenger;
 use crate::wire::access::Credentials;
 use crate::wire::endpoint::{bare_host, host_and_port};
 use rustls::client::WebPkiServerVerifier;
@@ -75,6 +76,21 @@ pub(super) fn credentials(tls: Option<&Tls>, world: &dyn DistributedWorld) -> Op
     let agents = 0..world.agent_count() as EntityId;
     let names = agents.map(|agent| CertificateName::Agent(world.name(agent)).to_string());
     Some(Credentials { tls, agents: names.collect() })
+}
+
+/// Makes a party believe nodes only by their signatures, where there are certificates, and a node sign.
+///
+/// # Errors
+/// When a file has become unreadable.
+pub(super) fn with_signatures(
+    messenger: Messenger,
+    credentials: Option<&Credentials>,
+) -> Result<Messenger, InputError> {
+    let Some(Credentials { tls, agents }) = credentials else { return Ok(messenger) };
+    messenger.with_signatures(tls, agents.clone()).map_err(|cause| {
+        let place = format!("--tls-cert {}", tls.certificate.display());
+        InputError::new(place, cause, "give --tls-ca, --tls-cert and --tls-key that can be read")
+    })
 }
 
 /// Checks that a node's certificate holds at the endpoints at which others reach it.

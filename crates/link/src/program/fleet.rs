@@ -1,6 +1,6 @@
 //! A fleet: the server of a world as a process, with the nodes that it starts.
 
-use super::certificates::{check_identity, credentials};
+use super::certificates::{check_identity, credentials, with_signatures};
 use super::children::NodeProcesses;
 use super::log::report_denials;
 use super::metrics::{MetricsExporter, fleet_metrics};
@@ -70,6 +70,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let scene = view::scene_json(&viewer_scene(run.simulation()));
     let views = ViewPublisher::new(ViewServer::start(&wire, scene).map_err(endpoint_error)?);
     let messenger = Messenger::new(PeerId::Server, Box::new(wire));
+    let messenger = with_signatures(messenger, credentials.as_ref())?;
     let config = ServerConfig {
         scenario: fingerprint,
         build: WORLDS.build().into(),

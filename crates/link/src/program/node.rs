@@ -1,6 +1,6 @@
 //! A node as a process.
 
-use super::certificates::{check_identity, check_names, credentials};
+use super::certificates::{check_identity, check_names, credentials, with_signatures};
 use super::log::report_denials;
 use super::metrics::{MetricsExporter, node_metrics};
 use super::parent_monitor::ParentMonitor;
@@ -42,19 +42,22 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
     let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
     let timeout = Duration::from_secs_f64(job.patience_s);
     let build = WORLDS.build();
-    let request = JoinRequest {
+    let mut request = JoinRequest {
         agent,
         scenario: scenario.fingerprint()?,
         build: build.into(),
         listens: ports.iter().map(|port| port.endpoint.clone()).collect(),
         process: std::process::id(),
+        session: None,
     };
     let credentials = credentials(tls, scenario.world.as_ref());
     let wire =
         ZenohWire::node_wire(PeerId::Node(agent), &job.connect, credentials.as_ref(), timeout)
             .map_err(endpoint_error)?
             .with_listeners(ports);
-    let mut messenger = Messenger::new(PeerId::Node(agent), Box::new(wire));
+    let messenger = Messenger::new(PeerId::Node(agent), Box::new(wire));
+    let mut messenger = with_signatures(messenger, credentials.as_ref())?;
+    request.session = messenger.session();
     let welcome = join(&mut messenger, &JoinConfig { join: request, timeout })
         .map_err(|e| node_error(e, job))?;
     monitor.record_seat();

@@ -48,7 +48,8 @@ impl FleetServer<'_> {
         }
         let process = join.process;
         if let Some(node) = self.nodes.get_mut(&agent) {
-            node.record_join(FleetMember { agent, incarnation, listens: join.listens }, process);
+            let JoinRequest { listens, session, .. } = join;
+            node.record_join(FleetMember { agent, incarnation, listens, session }, process);
         }
         let who = self.run.agent_display_name(agent);
         tracing::info!(agent, who, process, "a node has joined");
@@ -84,6 +85,7 @@ impl FleetServer<'_> {
         };
         self.check_build_and_scenario(join)?;
         self.check_listens(join)?;
+        self.check_session(incarnation, join)?;
         self.check_agent_free(entry, incarnation, join)
     }
 
@@ -123,6 +125,21 @@ impl FleetServer<'_> {
             return Err(JoinRefusal::new("listens", cause, remedy));
         }
         Ok(())
+    }
+
+    /// Refuses a node whose frames other nodes would not believe.
+    fn check_session(
+        &self,
+        incarnation: Incarnation,
+        join: &JoinRequest,
+    ) -> Result<(), JoinRefusal> {
+        let session = join.session.as_ref();
+        self.messenger.check_session(join.agent, incarnation, session).map_err(|reason| {
+            let cause = format!("other nodes would not believe what this one sends: {reason}");
+            let remedy =
+                "give the node the certificate of its agent by --tls-cert, with its --tls-key";
+            JoinRefusal::new("signature", cause, remedy)
+        })
     }
 
     /// Refuses a node whose agent has another one, or cannot get one again.

@@ -202,7 +202,12 @@ mod tests {
         let mut server = FleetServer::new(messenger, run, &mut hooks, config());
         server.has_begun = true;
         for agent in 0..3 {
-            let member = FleetMember { agent, incarnation: Incarnation(1), listens: Vec::new() };
+            let member = FleetMember {
+                agent,
+                incarnation: Incarnation(1),
+                listens: Vec::new(),
+                session: None,
+            };
             server.nodes.get_mut(&agent).expect("an entry").record_join(member, 0);
         }
         let groups = server.send_percepts();

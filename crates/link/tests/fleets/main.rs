@@ -11,6 +11,7 @@ mod input;
 mod namespaces;
 mod output;
 mod processes;
+mod relay;
 mod soak;
 mod support;
 mod threads;

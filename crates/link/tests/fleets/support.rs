@@ -203,6 +203,7 @@ pub(crate) fn run_in_threads(
                 build: "test".into(),
                 listens: (setup.listens)(agent),
                 process: 0,
+                session: None,
             };
             let world = world.clone();
             let lease = setup.lease;

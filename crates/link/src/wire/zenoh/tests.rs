@@ -86,6 +86,7 @@ fn three(is_mesh: bool) -> (ZenohWire, Vec<ZenohWire>) {
             agent,
             incarnation: crate::protocol::Incarnation(0),
             listens: listens(held),
+            session: None,
         })
         .collect();
     let node = |(agent, held): (EntityId, PortReservation)| {
@@ -274,7 +275,12 @@ fn two_in_a_mesh(seen: impl Fn(&str) -> String) -> ([ZenohWire; 3], Vec<FleetMem
     let members: Vec<FleetMember> = (0..)
         .zip(lives)
         .zip(seen_at)
-        .map(|((agent, incarnation), seen)| FleetMember { agent, incarnation, listens: vec![seen] })
+        .map(|((agent, incarnation), seen)| FleetMember {
+            agent,
+            incarnation,
+            listens: vec![seen],
+            session: None,
+        })
         .collect();
     let node = |(agent, held)| {
         let wire =
@@ -324,8 +330,12 @@ fn a_half_open_link_is_detected_and_opened_again() {
     assert!((0..20).any(|_| is_half_open(&mut second)), "it answers nothing");
     until(|| second.reopen_links().is_ok());
     assert!(comes(&mut second, 40), "it is heard");
-    let other =
-        FleetMember { agent: 0, incarnation: crate::protocol::Incarnation(7), listens: Vec::new() };
+    let other = FleetMember {
+        agent: 0,
+        incarnation: crate::protocol::Incarnation(7),
+        listens: Vec::new(),
+        session: None,
+    };
     assert!(!is_open(&second, &other), "another incarnation of it is not there");
 }
 
