@@ -37,6 +37,12 @@ pub(super) fn check_encryption<'a>(
             check_is_of_this_machine(endpoint)?;
         }
     }
+    if let Some(address) = &common.metrics
+        && tls.is_none()
+        && !common.is_insecure
+    {
+        check_metrics_address(address)?;
+    }
     Ok(())
 }
 
@@ -256,8 +262,7 @@ fn check_endpoint_encryption(endpoint: &str, tls: Option<&Tls>) -> Result<(), In
 /// own.
 fn check_is_of_this_machine(endpoint: &str) -> Result<(), InputError> {
     let Ok((host, _)) = host_and_port(endpoint) else { return Ok(()) };
-    let address = bare_host(host).parse::<IpAddr>();
-    if host == "localhost" || address.is_ok_and(|address| address.is_loopback()) {
+    if is_of_this_machine(host) {
         return Ok(());
     }
     let cause = "it is not of this machine alone, and without certificates whoever reaches it can take part in the fleet, \
@@ -266,6 +271,27 @@ fn check_is_of_this_machine(endpoint: &str) -> Result<(), InputError> {
                   the book has the commands that make certificates), an address as tcp/127.0.0.1:7600, or, on a network \
                   that you trust, --insecure";
     Err(InputError::new(endpoint, cause, remedy))
+}
+
+/// Refuses an address of metrics that others than the programs of this machine can reach. A text that is none has an error
+/// of its own.
+fn check_metrics_address(address: &str) -> Result<(), InputError> {
+    let Some((host, port)) = address.rsplit_once(':') else { return Ok(()) };
+    if is_of_this_machine(host) {
+        return Ok(());
+    }
+    let cause = "it is not of this machine alone, and whoever reaches it sees the state of the fleet, which has no \
+                 certificates";
+    let remedy = format!(
+        "give --metrics 127.0.0.1:{port}, certificates by --tls-ca, --tls-cert and --tls-key, or, on a network that you \
+         trust, --insecure"
+    );
+    Err(InputError::new(format!("--metrics {address}"), cause, remedy))
+}
+
+fn is_of_this_machine(host: &str) -> bool {
+    let address = bare_host(host).parse::<IpAddr>();
+    host == "localhost" || address.is_ok_and(|address| address.is_loopback())
 }
 
 fn read_tls_file(place: &str, file: &Path) -> Result<Vec<u8>, InputError> {

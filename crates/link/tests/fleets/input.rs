@@ -58,6 +58,7 @@ fn a_fleet_that_cannot_be_flown_is_refused_before_anything_is_started() {
         (listen("127.0.0.1:7600"), "tcp/HOST:PORT"),
         (metrics(&taken), "--metrics"),
         (metrics("no address"), "--metrics"),
+        (metrics("0.0.0.0:0"), "or, on a network that you trust, --insecure"),
     ];
     for (job, cause) in wrong {
         let said = refused(&Job::Fleet(job));
