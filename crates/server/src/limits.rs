@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::Notify;
 
 /// Maximum number of connections at a time: 16 pages and what they load beside, below the usual limit of open files.
 const MAX_CONNECTIONS: usize = 128;
@@ -10,48 +11,94 @@ const MAX_CONNECTIONS: usize = 128;
 /// that are forwarded (by `ssh -L`, say) seem to come.
 const MAX_CONNECTIONS_PER_PEER: usize = 64;
 
-/// The present connections, by peer.
+/// The present connections.
 #[derive(Debug, Default)]
-pub(crate) struct ConnectionLimiter(Mutex<BTreeMap<IpAddr, usize>>);
+pub(crate) struct ConnectionLimiter(Mutex<Connections>);
+
+#[derive(Debug, Default)]
+struct Connections {
+    /// In the order of their arrival.
+    present: BTreeMap<u64, Connection>,
+    /// Number of connections that have ever had a permit.
+    count: u64,
+}
+
+#[derive(Debug)]
+struct Connection {
+    peer: IpAddr,
+    /// Whether a request has arrived whole. Without one it is half-open: anybody can open thousands of these at no cost.
+    has_asked: bool,
+    /// Tells the connection that it has lost its permit.
+    ending: Arc<Notify>,
+}
 
 /// A permit for one connection, released on drop.
 #[derive(Debug)]
 pub(crate) struct ConnectionPermit {
     limiter: Arc<ConnectionLimiter>,
-    peer: IpAddr,
+    number: u64,
+    ending: Arc<Notify>,
 }
 
 impl ConnectionLimiter {
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<IpAddr, usize>> {
-        // The counts are consistent even if a thread has panicked while it held the lock.
+    fn lock(&self) -> MutexGuard<'_, Connections> {
+        // Every change is a single call, so the list is right even if a thread has panicked while it held the lock.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns a permit; `None` if there are too many connections.
+    /// Returns a permit; `None` if there are too many connections. One that has not asked for anything yet gives way, the
+    /// oldest first: who only opens connections keeps nobody out.
     pub(crate) fn acquire(self: &Arc<Self>, peer: IpAddr) -> Option<ConnectionPermit> {
         let peer = peer.to_canonical();
-        let mut by_peer = self.lock();
-        let all: usize = by_peer.values().sum();
-        let own = by_peer.get(&peer).copied().unwrap_or(0);
-        if all >= MAX_CONNECTIONS || (own >= MAX_CONNECTIONS_PER_PEER && !peer.is_loopback()) {
-            return None;
+        let mut connections = self.lock();
+        let own = connections.present.values().filter(|other| other.peer == peer).count();
+        let has_too_many = own >= MAX_CONNECTIONS_PER_PEER && !peer.is_loopback();
+        if has_too_many {
+            connections.end_oldest_silent(|other| other.peer == peer)?;
+        } else if connections.present.len() >= MAX_CONNECTIONS {
+            connections.end_oldest_silent(|_| true)?;
         }
-        by_peer.insert(peer, own + 1);
-        Some(ConnectionPermit { limiter: self.clone(), peer })
+        let number = connections.count;
+        connections.count += 1;
+        let ending = Arc::new(Notify::new());
+        let connection = Connection { peer, has_asked: false, ending: ending.clone() };
+        connections.present.insert(number, connection);
+        Some(ConnectionPermit { limiter: self.clone(), number, ending })
     }
 
     pub(crate) fn is_empty(&self) -> bool {
-        self.lock().is_empty()
+        self.lock().present.is_empty()
+    }
+}
+
+impl Connections {
+    /// Takes the permit of the oldest connection that has not asked for anything; `None` if there is none.
+    fn end_oldest_silent(&mut self, may_end: impl Fn(&Connection) -> bool) -> Option<()> {
+        let mut silent = self.present.iter().filter(|(_, other)| !other.has_asked);
+        let (&number, _) = silent.find(|(_, other)| may_end(other))?;
+        let ended = self.present.remove(&number)?;
+        ended.ending.notify_one();
+        Some(())
+    }
+}
+
+impl ConnectionPermit {
+    /// Records that a request has arrived: the connection keeps its permit from now on.
+    pub(crate) fn record_request(&self) {
+        if let Some(own) = self.limiter.lock().present.get_mut(&self.number) {
+            own.has_asked = true;
+        }
+    }
+
+    /// Waits until the permit is taken away.
+    pub(crate) async fn wait_for_loss(&self) {
+        self.ending.notified().await;
     }
 }
 
 impl Drop for ConnectionPermit {
     fn drop(&mut self) {
-        let mut by_peer = self.limiter.lock();
-        match by_peer.get_mut(&self.peer) {
-            Some(count) if *count > 1 => *count -= 1,
-            _ => drop(by_peer.remove(&self.peer)),
-        }
+        self.limiter.lock().present.remove(&self.number);
     }
 }
 
@@ -63,19 +110,26 @@ mod tests {
         IpAddr::from([192, 0, 2, k])
     }
 
+    /// Acquires a permit for a connection that asks for something.
+    fn ask(limiter: &Arc<ConnectionLimiter>, peer: IpAddr) -> Option<ConnectionPermit> {
+        let permit = limiter.acquire(peer)?;
+        permit.record_request();
+        Some(permit)
+    }
+
     #[test]
     fn one_peer_leaves_room_for_others_and_places_are_free_again() {
         let limiter = Arc::new(ConnectionLimiter::default());
         let mut places: Vec<ConnectionPermit> =
-            (0..MAX_CONNECTIONS_PER_PEER).filter_map(|_| limiter.acquire(peer(1))).collect();
+            (0..MAX_CONNECTIONS_PER_PEER).filter_map(|_| ask(&limiter, peer(1))).collect();
         assert_eq!(places.len(), MAX_CONNECTIONS_PER_PEER);
-        assert!(limiter.acquire(peer(1)).is_none());
-        assert!(limiter.acquire(IpAddr::from([0, 0, 0, 0, 0, 0xffff, 0xc000, 0x0201])).is_none());
-        places.extend((0..MAX_CONNECTIONS).filter_map(|_| limiter.acquire(peer(2))));
+        assert!(ask(&limiter, peer(1)).is_none());
+        assert!(ask(&limiter, IpAddr::from([0, 0, 0, 0, 0, 0xffff, 0xc000, 0x0201])).is_none());
+        places.extend((0..MAX_CONNECTIONS).filter_map(|_| ask(&limiter, peer(2))));
         assert_eq!(places.len(), MAX_CONNECTIONS);
-        assert!(limiter.acquire(peer(3)).is_none(), "in all");
+        assert!(ask(&limiter, peer(3)).is_none(), "in all");
         places.pop();
-        assert!(limiter.acquire(peer(3)).is_some());
+        assert!(ask(&limiter, peer(3)).is_some());
         places.clear();
         assert!(limiter.is_empty());
     }
@@ -84,8 +138,26 @@ mod tests {
     fn this_machine_may_have_all_as_others_may_stand_behind_it() {
         let limiter = Arc::new(ConnectionLimiter::default());
         let own: Vec<_> = (0..MAX_CONNECTIONS)
-            .map_while(|_| limiter.acquire(IpAddr::from([127, 0, 0, 1])))
+            .map_while(|_| ask(&limiter, IpAddr::from([127, 0, 0, 1])))
             .collect();
         assert_eq!(own.len(), MAX_CONNECTIONS);
+    }
+
+    #[test]
+    fn connections_that_ask_for_nothing_give_way_the_oldest_first_and_to_their_own_peer() {
+        let limiter = Arc::new(ConnectionLimiter::default());
+        let page = ask(&limiter, peer(1)).expect("a place");
+        let silent: Vec<_> = (0..1000).filter_map(|_| limiter.acquire(peer(1))).collect();
+        assert_eq!(silent.len(), 1000, "each of them was let in for a while");
+        let is_present =
+            |permit: &ConnectionPermit| limiter.lock().present.contains_key(&permit.number);
+        let present = silent.iter().filter(|permit| is_present(permit)).count();
+        assert_eq!(present, MAX_CONNECTIONS_PER_PEER - 1);
+        assert!(is_present(&page) && !is_present(&silent[0]) && is_present(&silent[999]));
+        assert_eq!(limiter.lock().present.len(), MAX_CONNECTIONS_PER_PEER, "others have theirs");
+        drop(silent);
+        assert!(!limiter.is_empty());
+        drop(page);
+        assert!(limiter.is_empty());
     }
 }

@@ -1,8 +1,12 @@
-//! Connections: accepted, served for some time, and ended. No idle one keeps its permit.
+//! Connections: accepted, served for some time, and ended. No idle one keeps its permit, and one that has not asked for
+//! anything yet gives way to others.
 
 use crate::limits::{ConnectionLimiter, ConnectionPermit};
 use axum::Router;
+use hyper::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::Service;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use std::io;
@@ -70,8 +74,8 @@ pub(crate) async fn serve(
         // Without it Nagle's algorithm would delay small frames. If it cannot be set, frames are only late.
         let _ = stream.set_nodelay(true);
         if let Some(permit) = limiter.acquire(address.ip()) {
-            let connection =
-                PermittedConnection { stream, stall_timer: StallTimer::default(), _permit: permit };
+            let stall_timer = StallTimer::default();
+            let connection = PermittedConnection { stream, stall_timer, permit: Arc::new(permit) };
             tokio::spawn(serve_connection(connection, routes.clone(), shutdown.clone(), timeouts));
         } else if let Ok(permit) = refusals.clone().try_acquire_owned() {
             tokio::spawn(async move {
@@ -100,12 +104,17 @@ async fn serve_connection(
     timeouts: Timeouts,
 ) {
     let stall_timer = connection.stall_timer.clone();
+    let permit = connection.permit.clone();
+    let routes = TowerToHyperService::new(routes);
+    let routes = PermittedRoutes { routes, permit: permit.clone() };
     let mut http = http1::Builder::new();
     let http = http.timer(TokioTimer::new()).header_read_timeout(timeouts.head);
-    let served = http.serve_connection(TokioIo::new(connection), TowerToHyperService::new(routes));
+    let served = http.serve_connection(TokioIo::new(connection), routes);
     let mut served = pin!(served.with_upgrades());
     tokio::select! {
         _ = &mut served => return,
+        // Nothing was asked, so there is nobody to be told.
+        () = permit.wait_for_loss() => return,
         () = wait_for_shutdown(shutdown.clone()) => {}
         () = sleep(timeouts.max_lifetime) => {
             served.as_mut().graceful_shutdown();
@@ -160,11 +169,28 @@ async fn refuse(mut stream: TcpStream) -> io::Result<()> {
     Ok(())
 }
 
+/// The routes for one connection, whose permit learns of its requests.
+struct PermittedRoutes {
+    routes: TowerToHyperService<Router>,
+    permit: Arc<ConnectionPermit>,
+}
+
+impl Service<Request<Incoming>> for PermittedRoutes {
+    type Response = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Response;
+    type Error = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Error;
+    type Future = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Future;
+
+    fn call(&self, request: Request<Incoming>) -> Self::Future {
+        self.permit.record_request();
+        self.routes.call(request)
+    }
+}
+
 /// A connection that keeps its permit also after it has become a WebSocket.
 struct PermittedConnection {
     stream: TcpStream,
     stall_timer: StallTimer,
-    _permit: ConnectionPermit,
+    permit: Arc<ConnectionPermit>,
 }
 
 impl AsyncRead for PermittedConnection {
@@ -316,12 +342,36 @@ mod tests {
         while !told.starts_with("HTTP/1.1 503") {
             // They keep their places for a while, and are then ended.
             inside.clear();
-            inside.extend((0..128).map(|_| connect(address)));
+            inside.extend((0..128).map(|_| {
+                let mut stream = connect(address);
+                stream.write_all(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n").expect("sent");
+                let _ = stream.read(&mut [0; 256]);
+                stream
+            }));
             told = ask(connect(address));
         }
         assert!(told.ends_with("try it again.\n"), "{told}");
         drop(inside);
         while !ask(connect(address)).ends_with("here") {}
+    }
+
+    #[test]
+    fn hundreds_of_connections_that_ask_for_nothing_cost_nobody_a_place() {
+        let (address, _ends) = impatient(Duration::from_secs(600));
+        let ask = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n";
+        let mut half_open = Vec::new();
+        for k in 0..400 {
+            let mut stream = connect(address);
+            // Some have begun to ask; one that was ended already cannot be written to.
+            let _ = stream.write_all(&ask[..k % ask.len()]);
+            half_open.push(stream);
+        }
+        let mut newcomer = connect(address);
+        newcomer
+            .write_all(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+            .expect("sent");
+        let told = heard(newcomer);
+        assert!(told.ends_with("here"), "{told}");
     }
 
     #[test]
