@@ -434,7 +434,7 @@ impl Messenger {
         if !is_signed(from, &[self.me]) {
             return Ok(bytes);
         }
-        match known.open((agent, incarnation), bytes) {
+        match known.open(agent, incarnation, bytes) {
             Ok(Some(frame)) => Ok(frame),
             Ok(None) => Err(drop_reason::STRANGER),
             Err(ForgedFrame) => Err(drop_reason::FORGED),

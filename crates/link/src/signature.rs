@@ -209,10 +209,10 @@ impl KnownKeys {
     /// signature.
     pub fn open<'a>(
         &self,
-        from: (EntityId, Incarnation),
+        agent: EntityId,
+        incarnation: Incarnation,
         bytes: &'a [u8],
     ) -> Result<Option<&'a [u8]>, ForgedFrame> {
-        let (agent, incarnation) = from;
         let known = self.keys.get(&agent).filter(|known| known.incarnation == incarnation);
         let Some(known) = known else { return Ok(None) };
         let (frame, signature) = bytes.split_last_chunk::<SIGNATURE_BYTES>().ok_or(ForgedFrame)?;
