@@ -1,8 +1,8 @@
-//! Benchmarks of fleets: a round of a team, a whole super-conflict beside one process, the time that a group takes to
-//! go on after the loss of a member, memory and bytes of nodes.
+//! Benchmarks of fleets: a round of a team, a whole super-conflict beside one process, the processor time of both, the
+//! time that a group takes to go on after the loss of a member, memory and bytes of nodes.
 //!
 //! Percentiles, and ratios within one run: `cargo bench -p sidestep-link`. Words select parts: `round`, `conflict`,
-//! `recovery`, `nodes`. `SIDESTEP_BENCH_S` is the number of seconds that the last one flies (60).
+//! `cost`, `recovery`, `nodes`. `SIDESTEP_BENCH_S` is the number of seconds that the last one flies (60).
 
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
@@ -33,6 +33,9 @@ fn main() {
     }
     if is_wanted("conflict") {
         conflict(10);
+    }
+    if is_wanted("cost") {
+        cost(10);
     }
     if is_wanted("recovery") {
         recovery(6, 24);
@@ -228,6 +231,78 @@ fn conflict(n: u32) {
     }
     ratios.sort_by(f64::total_cmp);
     println!("  median of the ratios: {:.1}", ratios[1]);
+}
+
+/// Processor and wall time, in seconds.
+#[derive(Clone, Copy)]
+struct Cost {
+    cpu_s: f64,
+    wall_s: f64,
+}
+
+/// Prints the processor time of a whole super-conflict, as processes beside one process: of all processes together, with
+/// and without their start.
+fn cost(n: u32) {
+    let mut ratios = Vec::new();
+    for _ in 0..3 {
+        let (alone, alone_digest) = cost_of_one_process(n);
+        let (start, _) = cost_of_fleet(n, 1);
+        let (fleet, digest) = cost_of_fleet(n, 1000);
+        assert_eq!(digest, alone_digest, "the digest of one process");
+        println!(
+            "processor time of a super-conflict of {n}: one process {:.2} s, {n} processes {:.2} s, {:.2} s of it for the \
+             start and one cycle",
+            alone.cpu_s, fleet.cpu_s, start.cpu_s
+        );
+        let without_start = (fleet.cpu_s - start.cpu_s) / alone.cpu_s;
+        ratios.push([fleet.cpu_s / alone.cpu_s, without_start, fleet.wall_s / alone.wall_s]);
+    }
+    let median = |k: usize| {
+        let mut values: Vec<f64> = ratios.iter().map(|ratio| ratio[k]).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    println!(
+        "  medians of the ratios: processor time {:.1}, without the start {:.1}; time by the clock {:.1}",
+        median(0),
+        median(1),
+        median(2)
+    );
+}
+
+/// Returns what a super-conflict costs in this process, and its digest.
+fn cost_of_one_process(n: u32) -> (Cost, String) {
+    let source = Source::new("s.toml", &*text(n, 1000), "");
+    let (began, cpu_s) = (Instant::now(), cpu_seconds());
+    let compiled = WORLDS.compile(&source).expect("a scenario");
+    let run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
+        .expect("started");
+    let digest = run.run_to_end(&NoWatcher).expect("flown").digest;
+    let wall_s = began.elapsed().as_secs_f64();
+    (Cost { cpu_s: cpu_seconds() - cpu_s, wall_s }, digest)
+}
+
+/// Returns what a super-conflict costs as a fleet, from the start of its processes to the end of the last one, and its
+/// digest.
+fn cost_of_fleet(n: u32, cycles: u64) -> (Cost, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("s.toml"), text(n, cycles)).expect("written");
+    let (began, cpu_s) = (Instant::now(), cpu_seconds());
+    let (digest, _) = fly(job(folder.path(), ClockMode::Lockstep), |_| true);
+    let wall_s = began.elapsed().as_secs_f64();
+    (Cost { cpu_s: cpu_seconds() - cpu_s, wall_s }, digest)
+}
+
+/// Returns the processor time of this process, and of all that it and its children have waited for, in seconds.
+fn cpu_seconds() -> f64 {
+    /// Clock ticks in a second: Linux counts in these on every machine.
+    const TICKS_PER_S: f64 = 100.0;
+    let text = std::fs::read_to_string("/proc/self/stat").expect("Linux");
+    // The name of the program, in parentheses, may have spaces.
+    let after_name = text.rsplit(')').next().unwrap_or_default();
+    // In user mode and in the kernel, of this process and of its children.
+    let ticks = after_name.split_whitespace().skip(11).take(4);
+    ticks.filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / TICKS_PER_S
 }
 
 /// News of a fleet: its state, or the part of a cycle to which an airplane has come.
