@@ -64,7 +64,7 @@ pub struct SweepFolder<P> {
 pub struct TempFolder(PathBuf);
 
 impl TempFolder {
-    /// Returns its path; nothing below it is left once this is dropped.
+    /// Returns its path; no bucket of runs below it is left once this is dropped.
     pub fn path(&self) -> &Path {
         &self.0
     }
@@ -72,8 +72,9 @@ impl TempFolder {
 
 impl Drop for TempFolder {
     fn drop(&mut self) {
-        // Its files were written by this process, which has removed most of them.
-        for file in list_tree(&self.0).unwrap_or_default() {
+        // This process has removed most of its files. Another's keeps the folder.
+        let files = list_tree(&self.0).unwrap_or_default();
+        for file in files.iter().filter(|file| is_bucket(file)) {
             let _ = fs::remove_file(self.0.join(file));
         }
         let _ = fs::remove_dir(&self.0);
