@@ -122,7 +122,7 @@ fn check_verify(flips: &mut Flips, all: &[Verified], times: usize) {
     for (path, files) in all {
         let before = verify(path).expect("a recording");
         assert_eq!(before.damaged, [], "{}", path.display());
-        assert_eq!(before.others, [PathBuf::new(); 0], "{}", path.display());
+        assert!(before.others.is_empty(), "{:?}", before.others);
         for file in files {
             for _ in 0..times {
                 let (bit, found) = flips.flip(file, || verify(path));

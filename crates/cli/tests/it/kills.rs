@@ -128,9 +128,9 @@ fn a_flight_that_is_killed_at_any_time_is_on_disk_until_the_last_second_and_is_n
         let delay = Duration::from_secs(6).mul_f64(fraction);
         assert!(runs_until(&mut fleet, || started.elapsed() >= delay), "a flight of hours");
         // The program of fleets, the command, or both; the other one ends by itself.
-        let server = child_process(fleet.id());
-        if kills % 3 != 1 {
-            server.map(try_kill);
+        let server = child_process(fleet.id()).filter(|_| kills % 3 != 1);
+        if let Some(server) = server {
+            try_kill(server);
         }
         if kills % 3 != 0 {
             fleet.kill().expect("killed");
