@@ -12,7 +12,8 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
-    GilbertElliott, Network, NetworkPartition, RadioOutage, TimeWindow, UnidirectionalLink,
+    GilbertElliott, Network, NetworkPartition, RadioBudget, RadioOutage, TimeWindow,
+    UnidirectionalLink,
 };
 use std::fmt::Debug;
 use std::marker::PhantomData;
@@ -35,6 +36,11 @@ pub trait AgentNaming {
     const CONVERSATIONS_PER_CYCLE: u32;
     /// Words for the longest deadline.
     const MAX_DEADLINE_TEXT: &str;
+
+    /// Returns the number of agents that share one radio channel; none in a world where agents are wired.
+    fn radio_senders(&self) -> Option<u32> {
+        None
+    }
 
     /// Returns a radio outage by its agent's id on the network.
     ///
@@ -88,6 +94,9 @@ pub struct NetworkSection<N: AgentNaming> {
     patience_s: Option<Positive>,
     deadline_s: Option<Positive>,
     bandwidth_bit_s: Option<Number<BandwidthRule>>,
+    /// Bytes per second that one radio channel carries for all agents together, headers and signatures included; each has an
+    /// equal share. Unlimited unless given.
+    budget_bytes_s: Option<Positive>,
     range_m: Option<Positive>,
     bursts: Option<BurstsSection>,
     silent: Vec<Spanned<N::RadioOutage>>,
@@ -105,6 +114,7 @@ impl<N: AgentNaming> Default for NetworkSection<N> {
             patience_s: None,
             deadline_s: None,
             bandwidth_bit_s: None,
+            budget_bytes_s: None,
             range_m: None,
             bursts: None,
             silent: Vec::new(),
@@ -199,6 +209,7 @@ impl<N: AgentNaming> NetworkSection<N> {
             duplication: self.duplication.map_or(0.0, f64::from),
             latency_s,
             bandwidth_bit_s: self.bandwidth_bit_s.map_or(f64::INFINITY, f64::from),
+            budget: None,
             max_delay_s,
             // A request and its answer take twice the latency and the delay; 3 leaves room for the answer's work.
             patience_s: self.patience_s.map_or(3.0 * (latency_s + max_delay_s), f64::from),
@@ -211,6 +222,7 @@ impl<N: AgentNaming> NetworkSection<N> {
         };
         check_times::<N>(&network, dt_s)?;
         Ok(Network {
+            budget: self.budget(names, network.deadline_s)?,
             radio_outages: read_faults(&self.silent, |section| names.radio_outage(section))?,
             partitions: read_faults(&self.partitions, |section| names.partition(section))?,
             unidirectional_links: read_faults(&self.one_way, |section| {
@@ -218,6 +230,29 @@ impl<N: AgentNaming> NetworkSection<N> {
             })?,
             ..network
         })
+    }
+}
+
+impl<N: AgentNaming> NetworkSection<N> {
+    /// Returns the radio's budget, if there is one, which must let each agent send something in a conversation.
+    fn budget(&self, names: &N, deadline_s: f64) -> Result<Option<RadioBudget>, SectionError> {
+        let Some(bytes_s) = self.budget_bytes_s.map(f64::from) else { return Ok(None) };
+        let Some(senders) = names.radio_senders() else {
+            let cause = "budget_bytes_s, but the agents of this world share no radio channel";
+            let remedy = "leave it out; bandwidth_bit_s limits each link";
+            return Err(SectionError::new(cause, remedy));
+        };
+        let min_bytes_s = RadioBudget::min_bytes_s(senders, deadline_s);
+        // A tick is lost at both ends of a conversation, so that the bound itself carries nothing.
+        if bytes_s <= min_bytes_s {
+            let cause = format!(
+                "budget_bytes_s = {bytes_s}, of which each of {senders} agents has an equal share: no message can be \
+                 sent in deadline_s = {deadline_s}"
+            );
+            let remedy = format!("give more than {} bytes/s", min_bytes_s.ceil());
+            return Err(SectionError::new(cause, remedy));
+        }
+        Ok(Some(RadioBudget { bytes_s, senders }))
     }
 }
 

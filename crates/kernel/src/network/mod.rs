@@ -5,6 +5,7 @@
 //! faulty_transport.rs   a transport with the faults of a network
 //! fault_injector.rs     the same for the packets of one agent, in a process of its own
 //! packet.rs             packets: the envelope of every message
+//! radio.rs              the budget of a radio channel that all share
 //! retry.rs              when an agent asks again for what it misses
 //! agent.rs              the programs of agents, and the loop that runs several of them
 //! ```
@@ -16,6 +17,7 @@ mod fault_injector;
 mod faulty_transport;
 mod links;
 mod packet;
+mod radio;
 mod retry;
 
 use crate::math;
@@ -31,6 +33,7 @@ pub use packet::{
     ConversationId, ConversationTopic, DropCounts, DropReason, HEADER_BYTES, PacketBuffer,
     PacketHeader, digest_pieces, fingerprint, parse_packet,
 };
+pub use radio::{PacketAdmission, PacketOutbox, RadioBudget, SIGNATURE_BYTES};
 pub use retry::RetryTimer;
 
 /// Probability of giving up an agent that can be reached: one in a billion conversations.
@@ -52,6 +55,8 @@ pub struct Network {
     pub latency_s: f64,
     /// Bits per second in each direction of each link; their time comes on top of the latency.
     pub bandwidth_bit_s: f64,
+    /// Bytes that the radio channel of all agents carries, if it is limited.
+    pub budget: Option<RadioBudget>,
     /// Largest further delay in seconds, drawn uniformly, so that messages overtake each other.
     pub max_delay_s: f64,
     /// Time in seconds without a new message after which an agent asks or sends again.
@@ -103,6 +108,13 @@ impl Network {
         self.bandwidth_bit_s * self.latency_s
     }
 
+    /// Returns the number of bits that an agent sends in a tick at most: as many as a link carries, and no more than its
+    /// share of the radio's budget.
+    fn sender_bits_per_tick(&self) -> f64 {
+        let share_bytes_s = self.budget.map_or(f64::INFINITY, |budget| budget.share_bytes_s());
+        self.bits_per_tick().min(8.0 * share_bytes_s * self.latency_s)
+    }
+
     /// Returns the number of ticks of a conversation.
     pub fn conversation_ticks(&self) -> u64 {
         self.s_to_ticks(self.deadline_s)
@@ -112,7 +124,7 @@ impl Network {
     pub fn retry_policy(&self) -> RetryPolicy {
         RetryPolicy {
             ticks: self.s_to_ticks(self.patience_s),
-            bits_per_tick: self.bits_per_tick(),
+            bits_per_tick: self.sender_bits_per_tick(),
             tries: self.max_tries(FALSE_GIVE_UP_PROBABILITY),
             first_tries: self.max_tries(FALSE_GIVE_UP_PROBABILITY_AFTER_MISS),
         }

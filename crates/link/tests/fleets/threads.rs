@@ -201,6 +201,18 @@ fn messages_that_take_time_by_their_size_take_it_in_threads_too() {
     assert_eq!(run_over_memory(&text), run_in_one_process(&text));
 }
 
+/// The budget of a radio spaces the packets of each agent out, and drops those that are too late, in a process of its own
+/// as in one process.
+#[test]
+fn the_budget_of_a_radio_defers_and_drops_the_same_messages_in_threads() {
+    for network in ["budget_bytes_s = 4000.0", "budget_bytes_s = 20000.0, loss = 0.05"] {
+        let text = superconflict(4, "compact-team", 12, &format!("network = {{ {network} }}"));
+        let (threads, one) = (run_over_memory(&text), run_in_one_process(&text));
+        assert!(one.metrics["budget_dropped"].as_u64() > Some(0), "{}", one.metrics);
+        assert_eq!(threads, one, "{network}");
+    }
+}
+
 /// Sockets of this machine, in both topologies.
 #[test]
 fn sockets_come_out_as_one_process_does_in_a_mesh_and_in_a_star() {

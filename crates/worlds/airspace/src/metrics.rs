@@ -107,6 +107,10 @@ metrics! {
         pub beacon_multicasts: u64 => "beacons with multicast",
         /// Bytes, if one such message could reach all near.
         pub beacon_multicast_bytes: u64 => "size of all beacons with multicast",
+        /// Messages that waited because of the radio's budget, until earlier ones of their sender were sent; each counts once.
+        pub budget_deferred: u64 => "messages deferred by the radio's budget",
+        /// Messages not sent, because the radio's budget would have carried them too late; each counts once.
+        pub budget_dropped: u64 => "messages dropped by the radio's budget",
         /// Simulated time that all talks took; none where one process decides or messages take no time. In seconds, of one
         /// talk after the other.
         pub network_s: Option<f64> => "time on the network",
@@ -380,6 +384,8 @@ pub(crate) fn metrics(
         beacon_bytes: beacons.bytes,
         beacon_multicasts: beacons.multicasts,
         beacon_multicast_bytes: beacons.multicast_bytes,
+        budget_deferred: traffic.deferred + beacons.deferred,
+        budget_dropped: traffic.dropped + beacons.dropped,
         network_s: network_s(world, traffic.ticks + beacons.ticks),
         optimizations,
         rounds_mean: mean(rounds as f64, optimizations as usize),

@@ -246,6 +246,8 @@ fn network(m: &Metrics) -> KeyValues {
         lines.push(key_value_pair("messages", sent + &took));
     }
     let counts = [
+        (m.budget_deferred, "messages deferred by the radio's budget"),
+        (m.budget_dropped, "messages dropped by the radio's budget"),
         (m.contacts_lost, "contacts lost"),
         (m.deadlines_missed, "agents out of time"),
         (m.shield_held_back, "plans held back"),

@@ -6,7 +6,7 @@ use super::participant::{
     ConversationEnd, ConversationProgress, FinishableParticipant, OutgoingMessage, Participant,
 };
 use sidestep_kernel::EntityId;
-use sidestep_kernel::network::{DropReason, OutgoingPacket};
+use sidestep_kernel::network::{DropReason, OutgoingPacket, PacketAdmission, PacketOutbox};
 use std::sync::Arc;
 
 /// The identity, participants and times of a conversation.
@@ -61,9 +61,9 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Starts it, and adds the first packets to `out`.
-    pub fn start(&mut self, tick: u64, out: &mut Vec<OutgoingPacket>) {
+    pub fn start(&mut self, tick: u64, out: &mut PacketOutbox) {
         self.participant.start(tick);
-        self.send(out);
+        self.send(tick, out);
     }
 
     /// Takes a message of another airplane.
@@ -75,7 +75,7 @@ impl<P: Participant + ?Sized> Conversation<P> {
         from: EntityId,
         message: &[u8],
         tick: u64,
-        out: &mut Vec<OutgoingPacket>,
+        out: &mut PacketOutbox,
     ) -> Result<(), DropReason> {
         if from == self.info.me || self.info.members.binary_search(&from).is_err() {
             return Err(DropReason::Sender);
@@ -84,14 +84,14 @@ impl<P: Participant + ?Sized> Conversation<P> {
             return Err(DropReason::TooLarge);
         }
         self.participant.on_message(from, message, tick)?;
-        self.send(out);
+        self.send(tick, out);
         Ok(())
     }
 
     /// Performs the actions that are due by a tick.
-    pub fn on_timer(&mut self, tick: u64, out: &mut Vec<OutgoingPacket>) {
+    pub fn on_timer(&mut self, tick: u64, out: &mut PacketOutbox) {
         self.participant.on_timer(tick);
-        self.send(out);
+        self.send(tick, out);
     }
 
     /// Returns the tick in which something is due, unless a message comes before it.
@@ -105,8 +105,8 @@ impl<P: Participant + ?Sized> Conversation<P> {
     }
 
     /// Seals all that the participant has to send, and counts it.
-    fn send(&mut self, out: &mut Vec<OutgoingPacket>) {
-        let ConversationSetup { id, me, fingerprint, is_silent, .. } = self.info;
+    fn send(&mut self, tick: u64, out: &mut PacketOutbox) {
+        let ConversationSetup { id, me, fingerprint, end_tick, is_silent, .. } = self.info;
         for OutgoingMessage { to, message } in self.participant.take_messages() {
             let to = to.map_or_else(|| self.others.clone(), |one| Arc::from([one]));
             if is_silent || to.is_empty() {
@@ -115,8 +115,16 @@ impl<P: Participant + ?Sized> Conversation<P> {
             let sequence = self.sent;
             let header = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
             let payload = message.into_packet(&header);
-            self.traffic.count_message(to.len(), payload.len());
-            out.push(OutgoingPacket { to, sequence, payload });
+            let (receivers, bytes) = (to.len(), payload.len());
+            match out.push(OutgoingPacket { to, sequence, payload }, tick, end_tick) {
+                PacketAdmission::Dropped => {
+                    self.traffic.dropped += 1;
+                    continue;
+                }
+                PacketAdmission::Deferred => self.traffic.deferred += 1,
+                PacketAdmission::Sent => {}
+            }
+            self.traffic.count_message(receivers, bytes);
             self.sent += 1;
         }
     }

@@ -13,6 +13,10 @@ pub struct NetworkTraffic {
     pub bytes: u64,
     /// Number of bytes if one message could reach all.
     pub multicast_bytes: u64,
+    /// Number of packets that waited for earlier ones of their sender, because of the radio's budget.
+    pub deferred: u64,
+    /// Number of packets that were not sent, because of the radio's budget.
+    pub dropped: u64,
     /// Number of ticks that the conversations took, one after the other.
     pub ticks: u64,
 }
@@ -24,6 +28,8 @@ impl NetworkTraffic {
         self.multicasts += other.multicasts;
         self.bytes += other.bytes;
         self.multicast_bytes += other.multicast_bytes;
+        self.deferred += other.deferred;
+        self.dropped += other.dropped;
         self.ticks += other.ticks;
     }
 

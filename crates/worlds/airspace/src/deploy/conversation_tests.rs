@@ -8,8 +8,8 @@ use crate::pilot::{ConversationId, ConversationSchedule, Protocol, retry_policy}
 use crate::purpose;
 use proptest::prelude::*;
 use sidestep_kernel::network::{
-    AgentLoop, FaultyTransport, Network, NetworkAgent, OutgoingPacket, RadioOutage, ReplyBatching,
-    TimeWindow, parse_packet,
+    AgentLoop, FaultyTransport, Network, NetworkAgent, OutgoingPacket, PacketOutbox, RadioOutage,
+    ReplyBatching, TimeWindow, parse_packet,
 };
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{EntityId, Seed};
@@ -102,7 +102,7 @@ impl ProtocolAgent for Adder {
 /// An agent that sends until it is done.
 struct Alone {
     conversation: Conversation<dyn FinishableParticipant<Outcome = u64>>,
-    out: Vec<OutgoingPacket>,
+    out: PacketOutbox,
     ended: Option<ConversationEnd<u64>>,
 }
 
@@ -146,7 +146,7 @@ impl NetworkAgent for Alone {
     }
 
     fn take_packets(&mut self) -> Vec<OutgoingPacket> {
-        std::mem::take(&mut self.out)
+        self.out.take_ready()
     }
 }
 
@@ -156,6 +156,7 @@ fn network(loss: f64, max_delay_s: f64, silences: Vec<RadioOutage>) -> Network {
         duplication: 0.2,
         latency_s: 0.001,
         bandwidth_bit_s: f64::INFINITY,
+        budget: None,
         max_delay_s,
         patience_s: 3.0 * (0.001 + max_delay_s),
         deadline_s: 1000.0,
@@ -195,7 +196,7 @@ fn sums(
         let participant = Box::new(ReliableEndpoint::new(Adder::new(me, group, rounds), config));
         let mut conversation: Conversation<dyn FinishableParticipant<Outcome = u64>> =
             Conversation::new(info, participant);
-        let mut out = Vec::new();
+        let mut out = PacketOutbox::default();
         conversation.start(begins, &mut out);
         Alone { conversation, out, ended: None }
     };

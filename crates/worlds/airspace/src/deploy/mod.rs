@@ -32,6 +32,7 @@ mod tests {
     use super::super::metrics::Metrics;
     use super::super::{AirspaceRun, airspace_run};
     use proptest::prelude::*;
+    use sidestep_kernel::network::SIGNATURE_BYTES;
     use sidestep_kernel::{Digest, Simulation};
     use sidestep_scenario::Source;
 
@@ -215,6 +216,35 @@ mod tests {
         assert!(pim > 1.5 * network_s("pim", ""), "{pim} s");
     }
 
+    /// What all airplanes put on the air, signatures included, stays within the budget; what does not fit is counted, and
+    /// costs time and not separation.
+    #[test]
+    fn a_radio_carries_no_more_than_its_budget_and_the_shield_keeps_all_apart() {
+        for (deployment, budget_bytes_s) in [("compact-team", 8000.0), ("team", 2000.0)] {
+            let network = format!("network = {{ budget_bytes_s = {budget_bytes_s} }}");
+            let mut run = over_a_bad_network("default", deployment, &network, 1);
+            run.advance(60);
+            let metrics = run.metrics();
+            let what = format!("{deployment}, {budget_bytes_s} bytes/s: {metrics:?}");
+            let signatures = SIGNATURE_BYTES as u64 * metrics.multicasts;
+            let on_air = (metrics.multicast_bytes + signatures) as f64;
+            assert!(on_air <= budget_bytes_s * 60.0 * 5.0, "{what}");
+            assert!(metrics.budget_dropped > 0, "{what}");
+            assert_eq!(metrics.losses_of_separation, 0, "{what}");
+        }
+    }
+
+    /// A budget that is never spent defers messages by a tick or two, and changes no flight.
+    #[test]
+    fn with_a_budget_that_suffices_airplanes_fly_as_without_one() {
+        let flown = |network: &str| {
+            let mut run = over_a_bad_network("default", "compact-team", network, 1);
+            run.advance(40);
+            (run.metrics().budget_dropped, run.digest())
+        };
+        assert_eq!(flown("network = { budget_bytes_s = 1e9 }"), flown("network = {}"));
+    }
+
     /// Without the shield, too, no agent waits forever; an airplane that is not heard flies on.
     #[test]
     fn without_the_shield_a_silent_airplane_stops_nobody() {
@@ -242,6 +272,8 @@ mod tests {
             ("team", "bursts = { loss = 0.5, lasts_s = 0, every_s = 1 }", "a number above 0"),
             ("team", "range_m = -1", "a number above 0"),
             ("team", "bandwidth_bit_s = 0", "at least 1 bit/s"),
+            ("team", "budget_bytes_s = 0", "a number above 0"),
+            ("team", "budget_bytes_s = 100", "give more than 144 bytes/s"),
         ];
         for (deployment, network, cause) in wrong {
             let text = format!(

@@ -25,7 +25,7 @@ use crate::world::AirspaceWorld;
 use cycle_state::{ConversationMismatch, PilotCyclePhase, PilotCycleState};
 use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
-    DropCounts, DropReason, NetworkAgent, OutgoingPacket, digest_pieces, parse_packet,
+    DropCounts, DropReason, NetworkAgent, OutgoingPacket, PacketOutbox, digest_pieces, parse_packet,
 };
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ pub struct Pilot {
     /// Talks that have ended for it.
     past: VecDeque<Conversation<dyn Participant>>,
     early: EarlyPackets,
-    out: Vec<OutgoingPacket>,
+    out: PacketOutbox,
     dropped: DropCounts,
 }
 
@@ -66,13 +66,13 @@ impl Pilot {
         assert!((id as usize) < world.airplanes.len(), "there is no airplane {id}");
         Self {
             fingerprint: world.fingerprint,
+            out: PacketOutbox::for_network(world.network.as_ref()),
             world,
             id,
             memory,
             state: None,
             past: VecDeque::new(),
             early: EarlyPackets::default(),
-            out: Vec::new(),
             dropped: DropCounts::default(),
         }
     }
@@ -112,6 +112,7 @@ impl Pilot {
         {
             self.keep_ended(conversation);
         }
+        self.out.clear_waiting();
         let control =
             AirplaneControl::stay_on_orbit(self.id, percept.cycle, PilotMemory::default());
         self.state = Some(PilotCycleState {
@@ -391,6 +392,7 @@ impl NetworkAgent for Pilot {
             conversation.on_timer(tick, &mut self.out);
         }
         self.advance(tick);
+        self.out.release(tick);
     }
 
     fn next_timer(&self) -> Option<u64> {
@@ -412,11 +414,11 @@ impl NetworkAgent for Pilot {
         let past = of_cycle.filter_map(|conversation| {
             conversation.next_timer().filter(|due| *due < conversation.info().end_tick)
         });
-        present.into_iter().chain(past).min()
+        present.into_iter().chain(past).chain(self.out.next_due()).min()
     }
 
     fn take_packets(&mut self) -> Vec<OutgoingPacket> {
-        std::mem::take(&mut self.out)
+        self.out.take_ready()
     }
 }
 

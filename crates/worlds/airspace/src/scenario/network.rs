@@ -89,6 +89,10 @@ impl AgentNaming for AirplaneIdRange {
     const MAX_DEADLINE_TEXT: &str = "at most half of dt_s: it holds for the optimization and again for the \
                                     shield's exchange";
 
+    fn radio_senders(&self) -> Option<u32> {
+        u32::try_from(self.0).ok()
+    }
+
     fn radio_outage(&self, one: &RadioOutageSection) -> Result<network::RadioOutage, SectionError> {
         self.check(&[one.airplane])?;
         let window = time_window(one.from_s, one.until_s)?;

@@ -33,6 +33,7 @@ fn network(loss: f64, delay: f64, duplication: f64, deadline: f64) -> Network {
         duplication,
         latency_s: 1e-3,
         bandwidth_bit_s: f64::INFINITY,
+        budget: None,
         max_delay_s: 1e-3 * delay,
         patience_s: 3e-3 * (1.0 + delay),
         deadline_s: 1e-3 * deadline,

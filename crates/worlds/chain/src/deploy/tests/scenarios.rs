@@ -371,6 +371,7 @@ fn a_network_needs_connectors_that_exist_and_times_that_fit() {
         ("partitions = [{ sides = [[0, 1], [1, 2]] }]", "name each connector once"),
         ("partitions = [{ sides = [[0, 1]] }]", "at least two"),
         ("bandwidth_bit_s = 0.5", "at least 1 bit/s"),
+        ("budget_bytes_s = 4000", "share no radio channel"),
     ];
     for (network, cause) in wrong {
         let text = text("team", &format!("network = {{ {network} }}\n{chain}"));
