@@ -68,7 +68,7 @@ pub struct RunFolder {
     pub(crate) files: SharedFileList,
     /// How the cycles come about that are recorded from now on.
     pub(crate) cycle_origin: CycleOrigin,
-    _lock: ProcessLock,
+    lock: ProcessLock,
 }
 
 impl RunFolder {
@@ -119,7 +119,7 @@ impl RunFolder {
         let scenario = scenario.clone();
         let files = SharedFileList::new(manifest.files.clone());
         let cycle_origin = run.cycle_origin;
-        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, _lock: lock })
+        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, lock })
     }
 
     /// Opens the folder at `path` to continue its run by simulation.
@@ -160,7 +160,19 @@ impl RunFolder {
         }
         let files = SharedFileList::new(files);
         let cycle_origin = CycleOrigin::Simulated;
-        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, _lock: lock })
+        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, lock })
+    }
+
+    /// Checks that the folder is where it was: the system lets a process write on to files of a folder that is gone.
+    ///
+    /// # Errors
+    /// When it was deleted, emptied or moved, or another one is in its place.
+    pub fn check_in_place(&self) -> Result<(), RecordError> {
+        if self.lock.is_at(&self.path.join(LOCK)) {
+            return Ok(());
+        }
+        let cause = "the folder was deleted, emptied or moved while the run wrote to it: nothing more is written";
+        Err(RecordError::new(self.path.display(), cause))
     }
 
     /// Returns the path of the folder, as it was given.

@@ -67,6 +67,11 @@ impl ProcessLock {
         Ok(lock)
     }
 
+    /// Returns whether the locked file is still at a path: its folder may be gone, or another one be in its place.
+    pub(crate) fn is_at(&self, path: &Path) -> bool {
+        file_id(path).is_ok_and(|id| id == self.id)
+    }
+
     fn write_holder(&mut self) -> io::Result<()> {
         self.file.set_len(0)?;
         self.file.write_all(self.process.to_string().as_bytes())

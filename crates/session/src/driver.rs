@@ -142,6 +142,9 @@ fn drive_slice(
     // The run hands over rows early when its buffers are full (`done < asked`). It may also be over exactly at the
     // end of a slice: then there is no further slice, and everything is due now.
     let are_buffers_full = done < asked;
+    if let Some(recording) = &sinks.recording {
+        recording.folder().check_in_place()?;
+    }
     if let Some(recording) = &mut sinks.recording
         && (are_buffers_full || run.cycle() == rows_due || run.is_over())
     {

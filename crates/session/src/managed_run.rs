@@ -535,7 +535,9 @@ fn storage_error(
     recording: Option<&RunRecorder>,
     error: &RecordError,
 ) -> Error {
+    let is_gone = recording.is_some_and(|recording| recording.folder().check_in_place().is_err());
     let remedy = match recording.map(|r| (r.folder().path(), r.is_in_flight())) {
+        _ if is_gone => "if it was moved, `sidestep resume DIR` continues it at its new place; else run the scenario again".into(),
         Some((folder, false)) => {
             format!("make room, then continue with `{}`", sidestep_command("resume", folder))
         }

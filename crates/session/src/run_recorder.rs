@@ -115,6 +115,7 @@ impl RunRecorder {
     /// An I/O error.
     pub(crate) fn record(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         let started = Instant::now();
+        self.folder.check_in_place()?;
         let is_checkpoint_due = run.cycle().is_multiple_of(self.checkpoint_every);
         match &mut self.rows {
             RowWriter::Simulation(recorder) => {

@@ -84,16 +84,16 @@ fn tell_of_mcap(folder: &Path, console: Console) -> Result<(), Failure> {
         return Ok(());
     };
     let file = request.path(folder);
-    let (state, replace) = if file.exists() {
-        ("ends where the run was stopped", " --replace")
+    let state = if file.exists() {
+        "ends where the run was stopped"
     } else {
-        ("was not finished, because the run was killed", "")
+        "was not finished, because the run was killed"
     };
     let export = sidestep_command("export --to mcap", folder);
     let out = shell_path(&file);
     let every = request.every;
     console.note(format!(
-        "{} {state}; `{export} --every {every} --out {out}{replace}` writes all of it.",
+        "{} {state}; `{export} --every {every} --out {out} --replace` writes all of it.",
         file.display()
     ));
     Ok(())

@@ -121,6 +121,37 @@ fn killed_then_resumed_to(place: &TestFolder, stops: &[&str]) -> Value {
 }
 
 #[test]
+fn a_run_whose_folder_is_deleted_moved_or_replaced_ends_at_once_and_writes_nowhere_else() {
+    for change in ["deleted", "emptied", "moved", "replaced"] {
+        let place = TestFolder::new();
+        // Its first checkpoint is hours away, and no rows are due before.
+        let args = ["--set", "record.checkpoint_every=1000000000"];
+        let child = place.start(&[&ENDLESS[..], &args].concat());
+        wait_for("the folder", || place.path("r/trajectories.partial").exists());
+        let folder = place.path("r");
+        match change {
+            "deleted" => std::fs::remove_dir_all(&folder).expect("deleted"),
+            "emptied" => {
+                for name in names(&folder).iter().filter(|name| name.ends_with("lock")) {
+                    std::fs::remove_file(folder.join(name)).expect("deleted");
+                }
+            }
+            _ => std::fs::rename(&folder, place.path("moved")).expect("moved"),
+        }
+        if change == "replaced" {
+            place.json(&["run", "s.toml", "--cycles", "20", "--out", "r"]);
+        }
+        let ended = CommandOutput(child.wait_with_output().expect("ended"));
+        assert_eq!(ended.code(), 1, "{change}: {}", ended.err());
+        assert!(ended.err().contains("was deleted, emptied or moved"), "{change}: {}", ended.err());
+        assert_eq!(folder.exists(), ["emptied", "replaced"].contains(&change), "{change}");
+        if change == "replaced" {
+            assert_eq!(place.run(&["verify", "r"]).code(), 0, "the other run is whole");
+        }
+    }
+}
+
+#[test]
 fn resume_tells_how_to_get_the_mcap_file_that_a_kill_left_incomplete() {
     let place = TestFolder::new();
     let args = ["--out", "r", "--mcap", "it's.mcap", "--mcap-every", "50"];
@@ -135,10 +166,11 @@ fn resume_tells_how_to_get_the_mcap_file_that_a_kill_left_incomplete() {
         let resumed = place.run(&["resume", "r"]);
         assert_eq!(resumed.code(), 0, "{}", resumed.err());
         let advised =
-            "`sidestep export --to mcap r --every 50 --out \"it's.mcap\"` writes all of it";
+            "`sidestep export --to mcap r --every 50 --out 'it'\\''s.mcap' --replace` writes all";
         assert!(resumed.err().contains(advised), "{}", resumed.err());
     }
-    let export = place.run(&["export", "r", "--to", "mcap", "--every", "50", "--out", "it's.mcap"]);
+    let args = ["--to", "mcap", "--every", "50", "--out", "it's.mcap", "--replace"];
+    let export = place.run(&[&["export", "r"], &args[..]].concat());
     assert_eq!(export.code(), 0, "{}", export.err());
     assert!(!place.path("it's.mcap.partial").exists(), "what was left is gone");
     assert_eq!(place.run(&["replay", "it's.mcap"]).code(), 0);

@@ -96,6 +96,20 @@ fn ctrl_c_keeps_finished_runs_and_resume_goes_on() {
 }
 
 #[test]
+fn a_sweep_whose_folder_is_deleted_ends_at_once() {
+    let place = place();
+    let args = ["sweep", "sweep.toml", "--replicate", "4000", "--out", "d"];
+    let child = place.start(&args);
+    wait_for("some runs", || finished(&place, "d").len() > 5);
+    std::fs::remove_dir_all(place.path("d")).expect("deleted");
+    let ended = child.wait_with_output().expect("ended");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("was deleted or moved"), "{said}");
+    assert!(!place.path("d").exists());
+}
+
+#[test]
 fn ctrl_c_while_a_sweep_is_planned_leaves_nothing() {
     let place = place();
     let before = place.names();

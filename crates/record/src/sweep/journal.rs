@@ -92,6 +92,12 @@ impl Journal {
     /// # Errors
     /// An I/O error; the journal then has the entries before this one.
     pub fn append(&mut self, entry: &impl Serialize) -> Result<(), RecordError> {
+        // The system lets a process write on to a file that was deleted with its folder.
+        if self.lock.as_ref().is_some_and(|lock| !lock.is_at(&lock_path(&self.path))) {
+            let cause =
+                "the folder was deleted or moved while runs wrote to it: nothing more is written";
+            return Err(RecordError::new(self.path.display(), cause));
+        }
         let line = line(entry).map_err(|e| RecordError::new(self.path.display(), e))?;
         let written = self.file.write_all(line.as_bytes());
         if let Err(error) = written {
