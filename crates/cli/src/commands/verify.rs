@@ -76,6 +76,7 @@ fn to_text(result: &Verification) -> String {
     let sound = result.sound;
     let mut text = match result.damaged.len() {
         0 => format!("{path}: sound, {sound} files\n"),
+        1 => format!("{path}: 1 of {} files is damaged\n", sound + 1),
         damaged => format!("{path}: {damaged} of {} files are damaged\n", sound + damaged),
     };
     let damaged = result.damaged.iter();
