@@ -317,8 +317,8 @@ impl Messenger {
         if forged > 0 {
             let count = self.stats.dropped.entry(drop_reason::FORGED).or_default();
             *count += forged;
-            let (me, count) = (self.me, *count);
-            tracing::warn!(%me, count, "frames whose sender is not who they say are refused");
+            let count = *count;
+            tracing::warn!(me = %self.me, count, "frames whose sender is not who they say are refused");
         }
     }
 

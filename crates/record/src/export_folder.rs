@@ -7,7 +7,7 @@ use sidestep_kernel::InputError;
 
 use crate::disk;
 use crate::file_manifest::{EXPORT, FileManifest};
-use crate::folder::IfExists;
+use crate::if_exists::IfExists;
 use crate::replacement::Replacement;
 use crate::run_content::{list_tree, slashed};
 use crate::staging::StagingFolder;
@@ -20,11 +20,6 @@ pub struct ExportFolder {
 }
 
 impl ExportFolder {
-    /// Returns the name of the list of files in such a folder.
-    pub fn list_name() -> String {
-        FileManifest::name_for(EXPORT)
-    }
-
     /// Refuses a place where such a folder may not be made.
     ///
     /// # Errors
@@ -88,6 +83,6 @@ impl ExportFolder {
         for path in list_tree(folder)? {
             list.files.insert_file(folder, &slashed(&path))?;
         }
-        Ok(list.write(&folder.join(Self::list_name()))?)
+        Ok(list.write(&folder.join(FileManifest::name_for(EXPORT)))?)
     }
 }

@@ -9,6 +9,7 @@ use sidestep_kernel::ports::{RecordError, TableSchema};
 
 use crate::disk;
 use crate::file_list::{FileList, SharedFileList};
+use crate::if_exists::IfExists;
 use crate::manifest::{self, Manifest, Status, json};
 use crate::mcap_request::McapRequest;
 use crate::origin::CycleOrigin;
@@ -37,16 +38,6 @@ pub struct NewRun {
     pub cycle_origin: CycleOrigin,
     /// The MCAP file that is written at the same time.
     pub mcap: Option<McapRequest>,
-}
-
-/// What to do if the folder holds a run already.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum IfExists {
-    /// Leave it alone and fail.
-    Refuse,
-    /// Delete those files that its manifest names, if they are as they were written. A folder in which one was changed,
-    /// or another file is in the way, is refused; other files stay.
-    Replace,
 }
 
 /// The state from which a stopped run goes on.

@@ -8,6 +8,7 @@ mod file_manifest;
 mod file_set;
 mod flight;
 mod group;
+mod if_exists;
 mod mcap_request;
 mod origin;
 mod part;
@@ -35,8 +36,9 @@ pub use file_list::{DamagedFile, FileFault, FileList, hash_file};
 pub use file_manifest::{EXPORT, FileManifest, REPORT};
 pub use file_set::{FileSet, free_name};
 pub use flight::FlightProgress;
-pub use folder::{IfExists, NewRun, ResumePoint, RunFolder};
+pub use folder::{NewRun, ResumePoint, RunFolder};
 pub use format::FormatVersion;
+pub use if_exists::IfExists;
 pub use manifest::{Manifest, Status};
 pub use mcap::{
     BagSchema, BagWriter, LiveFrameWriter, LiveServer, McapFooter, McapProvenance, McapRecorder,

@@ -3,7 +3,6 @@
 //! In a flight in real time the decisions were made by processes that had to keep deadlines; which of them came too
 //! late is known to nobody but the recording. A simulation of the same scenario is another run.
 
-use crate::manifest::Manifest;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -54,68 +53,4 @@ impl fmt::Display for OriginRange {
 /// Returns the ranges as text, e.g. `cycles 0 to 86 flown, cycles 87 to 399 simulated`.
 pub fn origins_text(origins: &[OriginRange]) -> String {
     origins.iter().map(OriginRange::to_string).collect::<Vec<_>>().join(", ")
-}
-
-impl Manifest {
-    /// Returns whether any part of the run is a flight in real time.
-    pub fn is_flight(&self) -> bool {
-        self.origins.iter().any(|range| range.origin == CycleOrigin::Flown)
-    }
-
-    /// Returns whether the run is a flight that nothing has continued by simulation.
-    pub fn ends_in_flight(&self) -> bool {
-        self.origins.last().is_some_and(|last| last.origin == CycleOrigin::Flown)
-    }
-
-    /// Returns how each of the cycles done came about; a folder that does not say so was simulated.
-    pub fn all_origins(&self) -> Vec<OriginRange> {
-        if self.origins.is_empty() && self.cycles_done > 0 {
-            let origin = CycleOrigin::Simulated;
-            return vec![OriginRange { from: 0, until: self.cycles_done, origin }];
-        }
-        self.origins.clone()
-    }
-
-    /// Records that all cycles before `done` are done, those after the last recorded range by `origin`.
-    pub(crate) fn record_progress(&mut self, done: u64, origin: CycleOrigin) {
-        self.cycles_done = done;
-        // A run that is continued at a checkpoint does the cycles after it again.
-        self.origins.retain(|range| range.from < done || range.from == 0);
-        match self.origins.last_mut() {
-            Some(last) if last.origin == origin => last.until = done,
-            Some(last) => {
-                last.until = last.until.min(done);
-                let from = last.until;
-                self.origins.push(OriginRange { from, until: done, origin });
-            }
-            None => self.origins.push(OriginRange { from: 0, until: done, origin }),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::manifest::new_manifest;
-
-    #[test]
-    fn a_flight_that_is_continued_by_simulation_says_so_of_every_cycle() {
-        let mut manifest = new_manifest("airspace", 1, "0.1.0", 400);
-        assert!(!manifest.is_flight() && manifest.all_origins().is_empty());
-        manifest.record_progress(0, CycleOrigin::Flown);
-        assert!(manifest.ends_in_flight(), "before its first cycle");
-        manifest.record_progress(87, CycleOrigin::Flown);
-        manifest.record_progress(87, CycleOrigin::Simulated);
-        assert!(manifest.is_flight() && !manifest.ends_in_flight());
-        manifest.record_progress(400, CycleOrigin::Simulated);
-        let text = origins_text(&manifest.all_origins());
-        assert_eq!(text, "cycles 0 to 86 flown, cycles 87 to 399 simulated");
-    }
-
-    #[test]
-    fn an_early_folder_was_simulated() {
-        let manifest = Manifest { cycles_done: 5, ..new_manifest("robots", 1, "0.1.0", 9) };
-        assert_eq!(origins_text(&manifest.all_origins()), "cycles 0 to 4 simulated");
-        assert!(!manifest.is_flight());
-    }
 }

@@ -262,8 +262,8 @@ impl TableWriter {
         let Some(mut growing) = self.growing.take() else { return Ok(()) };
         if growing.has_unsealed {
             let path = disk::partial_path(&self.folder).join(part_name(self.part_cycle));
-            let (schema, pairs) = (self.parquet_schema.clone(), self.key_values.clone());
-            self.part = Some(PartWriter::create(path, schema, pairs)?);
+            let schema = self.parquet_schema.clone();
+            self.part = Some(PartWriter::create(path, schema, self.key_values.clone())?);
             self.encode(&growing.columns)?;
             self.end_part(next_cycle)?;
             growing.has_unsealed = false;

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 
 use sidestep_kernel::InputError;
 
-use crate::export_folder::ExportFolder;
 use crate::file_manifest::{EXPORT, FileManifest};
 use crate::run_content::{RunContent, list_tree, slashed, unreadable};
 use crate::run_reader::RunReader;
@@ -68,7 +67,7 @@ impl Replacement {
     /// # Errors
     /// A folder without a list of its files; a file that was changed.
     pub(crate) fn of_export(folder: &Path) -> Result<Self, InputError> {
-        let list = ExportFolder::list_name();
+        let list = FileManifest::name_for(EXPORT);
         let place = folder.join(&list);
         if fs::symlink_metadata(&place).is_err() {
             let cause = "no list names the files in this folder: another program wrote them, or an older version of this one";

@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use sidestep_kernel::InputError;
 
-use crate::export_folder::ExportFolder;
 use crate::file_list::DamagedFile;
-use crate::file_manifest::FileManifest;
+use crate::file_manifest::{EXPORT, FileManifest};
 use crate::manifest::{Manifest, SWEEP_MANIFEST, Status};
 use crate::mcap::{check_mcap, is_begun_by_us, is_mcap};
 use crate::part::first_cycle;
@@ -161,7 +160,7 @@ fn find_list(path: &Path) -> Option<PathBuf> {
         return Some(path.to_path_buf());
     }
     let stem = FileManifest::name_for(&path.file_stem()?.to_string_lossy());
-    let of_folder = path.with_file_name(ExportFolder::list_name());
+    let of_folder = path.with_file_name(FileManifest::name_for(EXPORT));
     let mut lists = [FileManifest::beside(path), path.with_file_name(stem), of_folder].into_iter();
     lists.find(|list| list.is_file())
 }

@@ -6,7 +6,7 @@
 use super::number::{Fraction, NonNegative, Number, Positive, RightOpen, Rule};
 use super::schema;
 use super::spanned::Spanned;
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -36,6 +36,9 @@ pub trait AgentNaming {
     const CONVERSATIONS_PER_CYCLE: u32;
     /// Words for the longest deadline.
     const MAX_DEADLINE_TEXT: &str;
+
+    /// Whether agents share one radio channel; they are wired otherwise.
+    const SHARES_RADIO: bool = false;
 
     /// Returns the number of agents that share one radio channel; none in a world where agents are wired.
     fn radio_senders(&self) -> Option<u32> {
@@ -86,6 +89,7 @@ impl SectionError {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, bound = "N: AgentNaming")]
 #[schemars(rename = "NetworkSection", bound = "N: AgentNaming")]
+#[schemars(transform = remove_radio_keys::<N>)]
 pub struct NetworkSection<N: AgentNaming> {
     loss: Option<LossProbability>,
     duplication: Option<LossProbability>,
@@ -102,6 +106,14 @@ pub struct NetworkSection<N: AgentNaming> {
     silent: Vec<Spanned<N::RadioOutage>>,
     partitions: Vec<Spanned<N::Partition>>,
     one_way: Vec<Spanned<N::UnidirectionalLink>>,
+}
+
+/// Removes the keys of a radio channel from the schema of a world that has none, in which they are errors.
+fn remove_radio_keys<N: AgentNaming>(schema: &mut Schema) {
+    let properties = schema.get_mut("properties").and_then(Value::as_object_mut);
+    if let Some(properties) = properties.filter(|_| !N::SHARES_RADIO) {
+        properties.remove("budget_bytes_s");
+    }
 }
 
 impl<N: AgentNaming> Default for NetworkSection<N> {

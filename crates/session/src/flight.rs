@@ -1,8 +1,8 @@
 //! A recorded flight in real time: it is closed where its recording ends, and never continued unasked.
 
 use crate::driver::{RunTiming, Sinks, drive};
-use crate::managed_run::start_recorded;
 use crate::orders::replay_recorded;
+use crate::run_recorder::start_recorded;
 use crate::run_tables::read_summary;
 use crate::summary::{RunCost, Summary, SummaryFile};
 use crate::watcher::{NoWatcher, Watcher};

@@ -5,11 +5,10 @@ use crate::driver::{RunTiming, Sinks, drive};
 use crate::files::resolve_path;
 use crate::flight::{flight_error, replay_flight};
 use crate::frame_sink::{EndReason, FrameRows, FrameSink, McapSink, frame_rows};
-use crate::identity::Producer;
 use crate::live::{LiveControl, ViewerAddress};
 use crate::orders::has_orders;
 use crate::row_store::{RowSelection, RowStore};
-use crate::run_recorder::{RecordingPlan, RunRecorder, restore_run};
+use crate::run_recorder::{RecordingPlan, RunRecorder, restore_run, start_recorded};
 use crate::summary::{RunCost, RunStatus, Summary, SummaryFile};
 use crate::{Error, Watcher, picture};
 use sidestep_kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
@@ -379,27 +378,6 @@ impl ManagedRun {
         }
         Ok(summary)
     }
-}
-
-/// Returns the run of a folder at its start.
-///
-/// # Errors
-/// When the folder holds no run of one of `worlds` that this build can continue.
-pub(crate) fn start_recorded(
-    worlds: &Worlds,
-    folder: &RunFolder,
-    workers: usize,
-) -> Result<Box<dyn Simulation>, InputError> {
-    let path = folder.path();
-    let manifest = folder.manifest();
-    let producer =
-        Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
-    producer.check(worlds.build(), path, "run", |wrote| {
-        format!("continue it with sidestep {wrote}, or run its scenario again in a new folder")
-    })?;
-    let place = path.join("scenario.toml").display().to_string();
-    let source = Source::new(place, folder.scenario(), path);
-    Ok(worlds.compile(&source)?.start(&source, workers))
 }
 
 /// Refuses to continue a run whose agents had orders: they would get no more orders.

@@ -63,7 +63,8 @@ impl RecordedRun {
         let view = RunReader::open(path)?;
         view.check_files(|_| true)?;
         let place = path.join("scenario.toml").display().to_string();
-        let (origins, is_flight) = (view.manifest.all_origins(), view.manifest.is_flight());
+        let origins = view.manifest.all_origins();
+        let is_flight = view.manifest.is_flight();
         Ok(Self {
             path: path.to_path_buf(),
             worlds: worlds.clone(),

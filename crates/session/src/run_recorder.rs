@@ -4,13 +4,14 @@ use crate::Error;
 use crate::VERSION;
 use crate::files::resolve_path;
 use crate::flight_recorder::FlightRecorder;
+use crate::identity::Producer;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::ports::{RecordError, Recorder};
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_record::{
     CycleOrigin, IfExists, McapRequest, NewRun, ParquetRecorder, Provenance, ResumePoint, RunFolder,
 };
-use sidestep_scenario::ResolvedScenario;
+use sidestep_scenario::{ResolvedScenario, Source, Worlds};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -220,6 +221,27 @@ pub(crate) fn write_inputs(folder: &Path, files: &[(String, Vec<u8>)]) -> Result
             .map_err(|e| RecordError::new(path.display(), e))?;
     }
     Ok(())
+}
+
+/// Returns the run of a folder at its start.
+///
+/// # Errors
+/// When the folder holds no run of one of `worlds` that this build can continue.
+pub(crate) fn start_recorded(
+    worlds: &Worlds,
+    folder: &RunFolder,
+    workers: usize,
+) -> Result<Box<dyn Simulation>, InputError> {
+    let path = folder.path();
+    let manifest = folder.manifest();
+    let producer =
+        Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };
+    producer.check(worlds.build(), path, "run", |wrote| {
+        format!("continue it with sidestep {wrote}, or run its scenario again in a new folder")
+    })?;
+    let place = path.join("scenario.toml").display().to_string();
+    let source = Source::new(place, folder.scenario(), path);
+    Ok(worlds.compile(&source)?.start(&source, workers))
 }
 
 /// Sets a run to the point from which its folder can continue.

@@ -235,9 +235,10 @@ fn print_result(
         let animation = animation.map_or(String::new(), |(pictures, fps)| {
             animation_text(format, pictures, fps, &paths[0])
         });
-        let origins = match recorded.is_flight {
-            true => format!("  {}\n", origins_text(origins)),
-            false => String::new(),
+        let origins = if recorded.is_flight {
+            format!("  {}\n", origins_text(origins))
+        } else {
+            String::new()
         };
         format!("{names}{size}{confirmed}{origins}{animation}")
     })

@@ -109,7 +109,8 @@ fn resume_flight(args: &ResumeArgs, console: Console) -> Result<ExitCode, Failur
     }
     let workers = args.workers.count();
     let run = ManagedRun::simulate_flight(worlds(), &args.folder, workers, args.cycles)?;
-    let (folder, cycle) = (args.folder.display(), group_thousands(run.cycle()));
+    let folder = args.folder.display();
+    let cycle = group_thousands(run.cycle());
     console.note(format!(
         "Simulating {folder} from cycle {cycle} on: these cycles are flown by nobody, and marked as simulated"
     ));

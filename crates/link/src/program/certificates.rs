@@ -226,8 +226,8 @@ impl CertificateParts {
         let name = ServerName::try_from(host).map_err(|e| Error::General(e.to_string()))?;
         let builder = WebPkiServerVerifier::builder_with_provider(self.roots.clone(), provider());
         let verifier = builder.build().map_err(|e| Error::General(e.to_string()))?;
-        let (end, between) = (&self.chain[0], &self.chain[1..]);
-        verifier.verify_server_cert(end, between, &name, &[], UnixTime::now()).map(drop)
+        let end = &self.chain[0];
+        verifier.verify_server_cert(end, &self.chain[1..], &name, &[], UnixTime::now()).map(drop)
     }
 }
 

@@ -151,7 +151,8 @@ impl Rights {
             ("egress", &["query"], &self.queries_out),
             ("ingress", &["reply", "declare_queryable"], &self.queries_out),
         ];
-        let (mut rules, mut names) = (Vec::new(), Vec::new());
+        let mut rules = Vec::new();
+        let mut names = Vec::new();
         for (flow, messages, keys) in all.into_iter().filter(|(.., keys)| !keys.is_empty()) {
             let id = format!("{party} {flow} {}", messages[0]);
             rules.push(json!({
@@ -186,7 +187,9 @@ pub(super) fn access_control(at: Guarded, agents: &[String]) -> Value {
             rights.push((SERVER_NAME, Rights { queries_out: views(), ..Rights::default() }));
         }
     }
-    let (mut rules, mut subjects, mut policies) = (Vec::new(), Vec::new(), Vec::new());
+    let mut rules = Vec::new();
+    let mut subjects = Vec::new();
+    let mut policies = Vec::new();
     for (party, rights) in rights {
         let (own, names) = rights.rules(party);
         rules.extend(own);

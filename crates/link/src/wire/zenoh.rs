@@ -218,7 +218,8 @@ fn subscribe(
     inbox: &Inbox,
     echoes: &EchoProbes,
 ) -> Result<Subscriber<()>, String> {
-    let (frames, forged) = (inbox.frames.clone(), inbox.forged.clone());
+    let frames = inbox.frames.clone();
+    let forged = inbox.forged.clone();
     let is_echo = match me {
         PeerId::Node(agent) => Some(echoes.handler(agent, session.clone())),
         PeerId::Server => None,

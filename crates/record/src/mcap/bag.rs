@@ -10,7 +10,8 @@ use ::mcap::records::MessageHeader;
 use ::mcap::{McapError, Writer};
 use sidestep_kernel::ports::RecordError;
 
-use super::writer::{error_text, write_options};
+use super::check::error_text;
+use super::writer::write_options;
 
 /// The version of the layout of `metadata.yaml`: that of ROS 2 Humble, which later ones read.
 const METADATA_VERSION: u32 = 5;

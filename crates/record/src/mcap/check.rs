@@ -10,7 +10,6 @@ use ::mcap::{McapError, parse_record};
 use sidestep_kernel::InputError;
 
 use super::reader::{McapRunInfo, damaged};
-use super::writer::error_text;
 
 /// The begin of the name of this program in files that it wrote.
 pub(super) const LIBRARY: &str = "sidestep ";
@@ -87,5 +86,13 @@ fn library(path: &Path) -> Option<String> {
                 return Some(header.library);
             }
         }
+    }
+}
+
+/// Returns the system's message, without the library's wrapping.
+pub(super) fn error_text(error: McapError) -> String {
+    match error {
+        McapError::Io(error) => error.to_string(),
+        other => other.to_string(),
     }
 }

@@ -12,13 +12,13 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 use sidestep_kernel::view::{Frame, Scenery};
 
-use super::check::{LIBRARY, check_mcap, is_begun_by_us};
+use super::check::{LIBRARY, check_mcap, error_text, is_begun_by_us};
 use super::frame_encoder::{FrameEncoder, MessageSink};
 use super::{METADATA, SCENARIO};
 use crate::disk;
 use crate::file_set::in_the_way;
-use crate::folder::IfExists;
 use crate::format;
+use crate::if_exists::IfExists;
 use crate::manifest::Status;
 use crate::schema::Provenance;
 
@@ -292,9 +292,10 @@ impl Drop for McapRecorder {
 }
 
 fn exists_already(path: &Path, is_whole: bool) -> InputError {
-    let cause = match is_whole {
-        true => "the file exists already",
-        false => "a recording that was stopped or killed is there",
+    let cause = if is_whole {
+        "the file exists already"
+    } else {
+        "a recording that was stopped or killed is there"
     };
     InputError::new(path.display(), cause, "give another file, or replace it (--replace)")
 }
@@ -307,12 +308,4 @@ pub(super) fn write_options(version: &str) -> WriteOptions {
         .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES))
         .library(format!("{LIBRARY}{version}"))
-}
-
-/// Returns the system's message, without the library's wrapping.
-pub(super) fn error_text(error: McapError) -> String {
-    match error {
-        McapError::Io(error) => error.to_string(),
-        other => other.to_string(),
-    }
 }

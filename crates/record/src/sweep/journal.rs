@@ -70,8 +70,8 @@ impl Journal {
         let file = file.map_err(|e| unwritable(path, &e))?;
         let length = read_complete_lines(path, of, Tail::Repaired, each)?;
         file.set_len(length).map_err(|e| unwritable(path, &e))?;
-        let (path_buf, synced) = (path.to_path_buf(), Instant::now());
-        let mut journal = Self { path: path_buf, file, length, synced, lock };
+        let synced = Instant::now();
+        let mut journal = Self { path: path.to_path_buf(), file, length, synced, lock };
         journal.file.seek(SeekFrom::End(0)).map_err(|e| unwritable(path, &e))?;
         if length == 0 {
             let header = JournalHeader {

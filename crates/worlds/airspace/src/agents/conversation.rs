@@ -115,7 +115,8 @@ impl<P: Participant + ?Sized> Conversation<P> {
             let sequence = self.sent;
             let header = PacketHeader { fingerprint, conversation: id, sender: me, sequence };
             let payload = message.into_packet(&header);
-            let (receivers, bytes) = (to.len(), payload.len());
+            let receivers = to.len();
+            let bytes = payload.len();
             match out.push(OutgoingPacket { to, sequence, payload }, tick, end_tick) {
                 PacketAdmission::Dropped => {
                     self.traffic.dropped += 1;

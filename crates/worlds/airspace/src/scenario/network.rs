@@ -83,6 +83,7 @@ impl AgentNaming for AirplaneIdRange {
     type Partition = PartitionSection;
     type UnidirectionalLink = UnidirectionalLinkSection;
 
+    const SHARES_RADIO: bool = true;
     const DEFAULT_LATENCY_S: f64 = 0.001;
     const MIN_LATENCY_S: f64 = 1e-6;
     const CONVERSATIONS_PER_CYCLE: u32 = 2;
