@@ -99,11 +99,19 @@ pub(crate) fn parent(path: &Path) -> &Path {
 }
 
 /// Returns the folders that have to be made for a folder, and itself, the outermost first.
-pub(crate) fn missing_folders(folder: &Path) -> Vec<PathBuf> {
+pub fn missing_folders(folder: &Path) -> Vec<PathBuf> {
     let ancestors = folder.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
     let mut missing: Vec<_> = ancestors.map(Path::to_path_buf).collect();
     missing.reverse();
     missing
+}
+
+/// Removes folders that were made in vain, the outermost of which is first; one with something in it stays.
+pub fn remove_folders(made: &[PathBuf]) {
+    for folder in made.iter().rev() {
+        // Fails, as it should, if the folder is not empty.
+        let _ = fs::remove_dir(folder);
+    }
 }
 
 /// Makes the names in a folder durable, if the system can.

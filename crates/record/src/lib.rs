@@ -31,6 +31,7 @@ pub mod run_table;
 pub mod sweep;
 pub mod verify;
 
+pub use disk::{missing_folders, remove_folders};
 pub use export_folder::ExportFolder;
 pub use file_list::{DamagedFile, FileFault, FileList, hash_file};
 pub use file_manifest::{EXPORT, FileManifest, REPORT};

@@ -26,8 +26,11 @@ struct Connections {
 #[derive(Debug)]
 struct Connection {
     peer: IpAddr,
-    /// Whether a request has arrived whole. Without one it is half-open: anybody can open thousands of these at no cost.
-    has_asked: bool,
+    /// Number of requests that are being answered. Without one it is half-open or idle: anybody can have thousands of these
+    /// at no cost.
+    requests: usize,
+    /// Whether it has become a WebSocket.
+    is_socket: bool,
     /// Tells the connection that it has lost its permit.
     ending: Arc<Notify>,
 }
@@ -46,22 +49,22 @@ impl ConnectionLimiter {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns a permit; `None` if there are too many connections. One that has not asked for anything yet gives way, the
-    /// oldest first: who only opens connections keeps nobody out.
+    /// Returns a permit; `None` if there are too many connections. One that asks for nothing gives way, the oldest first:
+    /// who only opens connections keeps nobody out.
     pub(crate) fn acquire(self: &Arc<Self>, peer: IpAddr) -> Option<ConnectionPermit> {
         let peer = peer.to_canonical();
         let mut connections = self.lock();
         let own = connections.present.values().filter(|other| other.peer == peer).count();
         let has_too_many = own >= MAX_CONNECTIONS_PER_PEER && !peer.is_loopback();
         if has_too_many {
-            connections.end_oldest_silent(|other| other.peer == peer)?;
+            connections.end_oldest_idle(|other| other.peer == peer)?;
         } else if connections.present.len() >= MAX_CONNECTIONS {
-            connections.end_oldest_silent(|_| true)?;
+            connections.end_oldest_idle(|_| true)?;
         }
         let number = connections.count;
         connections.count += 1;
         let ending = Arc::new(Notify::new());
-        let connection = Connection { peer, has_asked: false, ending: ending.clone() };
+        let connection = Connection { peer, requests: 0, is_socket: false, ending: ending.clone() };
         connections.present.insert(number, connection);
         Some(ConnectionPermit { limiter: self.clone(), number, ending })
     }
@@ -72,10 +75,11 @@ impl ConnectionLimiter {
 }
 
 impl Connections {
-    /// Takes the permit of the oldest connection that has not asked for anything; `None` if there is none.
-    fn end_oldest_silent(&mut self, may_end: impl Fn(&Connection) -> bool) -> Option<()> {
-        let mut silent = self.present.iter().filter(|(_, other)| !other.has_asked);
-        let (&number, _) = silent.find(|(_, other)| may_end(other))?;
+    /// Takes the permit of the oldest connection that asks for nothing; `None` if there is none.
+    fn end_oldest_idle(&mut self, may_end: impl Fn(&Connection) -> bool) -> Option<()> {
+        let is_idle = |other: &Connection| other.requests == 0 && !other.is_socket;
+        let mut idle = self.present.iter().filter(|(_, other)| is_idle(other));
+        let (&number, _) = idle.find(|(_, other)| may_end(other))?;
         let ended = self.present.remove(&number)?;
         ended.ending.notify_one();
         Some(())
@@ -83,16 +87,36 @@ impl Connections {
 }
 
 impl ConnectionPermit {
-    /// Records that a request has arrived: the connection keeps its permit from now on.
-    pub(crate) fn record_request(&self) {
+    fn change(&self, change: impl FnOnce(&mut Connection)) {
         if let Some(own) = self.limiter.lock().present.get_mut(&self.number) {
-            own.has_asked = true;
+            change(own);
         }
+    }
+
+    /// Records that a request has arrived: the connection keeps its permit until it is answered.
+    pub(crate) fn begin_request(self: &Arc<Self>) -> RequestInProgress {
+        self.change(|own| own.requests += 1);
+        RequestInProgress(self.clone())
+    }
+
+    /// Records that the connection has become a WebSocket, which keeps its permit for good.
+    pub(crate) fn record_socket(&self) {
+        self.change(|own| own.is_socket = true);
     }
 
     /// Waits until the permit is taken away.
     pub(crate) async fn wait_for_loss(&self) {
         self.ending.notified().await;
+    }
+}
+
+/// A request on a connection; it is answered when this is dropped.
+#[derive(Debug)]
+pub(crate) struct RequestInProgress(Arc<ConnectionPermit>);
+
+impl Drop for RequestInProgress {
+    fn drop(&mut self) {
+        self.0.change(|own| own.requests -= 1);
     }
 }
 
@@ -113,7 +137,7 @@ mod tests {
     /// Acquires a permit for a connection that asks for something.
     fn ask(limiter: &Arc<ConnectionLimiter>, peer: IpAddr) -> Option<ConnectionPermit> {
         let permit = limiter.acquire(peer)?;
-        permit.record_request();
+        permit.record_socket();
         Some(permit)
     }
 
@@ -158,6 +182,24 @@ mod tests {
         drop(silent);
         assert!(!limiter.is_empty());
         drop(page);
+        assert!(limiter.is_empty());
+    }
+
+    #[test]
+    fn a_connection_keeps_its_place_while_it_is_answered_and_gives_way_when_it_is_idle() {
+        let limiter = Arc::new(ConnectionLimiter::default());
+        let mut places = Vec::new();
+        let mut requests = Vec::new();
+        for _ in 0..MAX_CONNECTIONS {
+            let permit = Arc::new(limiter.acquire(IpAddr::from([127, 0, 0, 1])).expect("a place"));
+            requests.push(permit.begin_request());
+            places.push(permit);
+        }
+        assert!(limiter.acquire(peer(1)).is_none(), "all are being answered");
+        drop(requests.pop());
+        assert!(limiter.acquire(peer(1)).is_some(), "the last one is idle now");
+        drop(requests);
+        drop(places);
         assert!(limiter.is_empty());
     }
 }

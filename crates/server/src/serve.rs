@@ -1,14 +1,16 @@
-//! Connections: accepted, served for some time, and ended. No idle one keeps its permit, and one that has not asked for
-//! anything yet gives way to others.
+//! Connections: accepted, served for some time, and ended. One that asks for nothing gives way to others, and no idle one
+//! keeps its permit for long.
 
-use crate::limits::{ConnectionLimiter, ConnectionPermit};
+use crate::limits::{ConnectionLimiter, ConnectionPermit, RequestInProgress};
 use axum::Router;
-use hyper::Request;
-use hyper::body::Incoming;
+use axum::body::{Body, Bytes, HttpBody};
+use hyper::body::{Frame, Incoming, SizeHint};
 use hyper::server::conn::http1;
 use hyper::service::Service;
+use hyper::{Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use std::convert::Infallible;
 use std::io;
 use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -176,13 +178,47 @@ struct PermittedRoutes {
 }
 
 impl Service<Request<Incoming>> for PermittedRoutes {
-    type Response = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Response;
-    type Error = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Error;
-    type Future = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Future;
+    type Response = Response<PermittedBody>;
+    type Error = Infallible;
+    type Future = Pin<Box<dyn Future<Output = Result<Self::Response, Infallible>> + Send>>;
 
     fn call(&self, request: Request<Incoming>) -> Self::Future {
-        self.permit.record_request();
-        self.routes.call(request)
+        let permit = self.permit.clone();
+        let in_progress = permit.begin_request();
+        let answer = self.routes.call(request);
+        Box::pin(async move {
+            let answer = answer.await?;
+            if answer.status() == StatusCode::SWITCHING_PROTOCOLS {
+                permit.record_socket();
+            }
+            Ok(answer.map(|body| PermittedBody { body, _in_progress: in_progress }))
+        })
+    }
+}
+
+/// The body of an answer, which is in progress until all of it is sent.
+struct PermittedBody {
+    body: Body,
+    _in_progress: RequestInProgress,
+}
+
+impl HttpBody for PermittedBody {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.body).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
     }
 }
 
@@ -344,8 +380,7 @@ mod tests {
             inside.clear();
             inside.extend((0..128).map(|_| {
                 let mut stream = connect(address);
-                stream.write_all(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n").expect("sent");
-                let _ = stream.read(&mut [0; 256]);
+                stream.write_all(b"GET /late HTTP/1.1\r\nHost: a\r\n\r\n").expect("sent");
                 stream
             }));
             told = ask(connect(address));
@@ -362,8 +397,8 @@ mod tests {
         let mut half_open = Vec::new();
         for k in 0..400 {
             let mut stream = connect(address);
-            // Some have begun to ask; one that was ended already cannot be written to.
-            let _ = stream.write_all(&ask[..k % ask.len()]);
+            // Some have begun to ask, and some are idle after an answer; one that was ended already cannot be written to.
+            let _ = stream.write_all(&ask[..k % (ask.len() + 1)]);
             half_open.push(stream);
         }
         let mut newcomer = connect(address);

@@ -1,7 +1,7 @@
 //! Files that are written completely or not at all.
 
 use crate::Error;
-use sidestep_record::{free_name, resolve_link};
+use sidestep_record::{free_name, missing_folders, remove_folders, resolve_link};
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
 use std::path::{Path, PathBuf};
@@ -57,12 +57,14 @@ pub(crate) fn replace_atomically<T>(
     // Beside the target, because a file is renamed in one step only within its file system; with the process id,
     // because two processes may write the same file at once.
     let partial = &free_name(path);
+    let folders = missing_folders(path.parent().unwrap_or(path));
     let made = make(partial).and_then(|made| {
         std::fs::rename(partial, path).map_err(|e| Error::cannot_write(path, &e))?;
         Ok(made)
     });
     if made.is_err() {
         let _ = std::fs::remove_file(partial);
+        remove_folders(&folders);
     }
     made
 }

@@ -9,6 +9,7 @@ use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep::kernel::shell::sidestep_command;
 use sidestep::scenario::WorldType;
+use sidestep_record::{missing_folders, remove_folders};
 use sidestep_session::display_path;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -57,14 +58,18 @@ pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure>
 
 fn write_new(path: &Path, text: &str) -> Result<(), InputError> {
     create_with_text(path, text).map_err(|e| {
-        let remedy = "give a file that does not exist yet, in a folder where you may write";
+        let remedy = "give a file that does not exist yet, in a folder where you may write, on a disk with room";
         InputError::new(path.display(), format!("cannot create the file: {e}"), remedy)
     })
 }
 
 fn create_with_text(path: &Path, text: &str) -> std::io::Result<()> {
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)?;
-    }
-    std::fs::File::create_new(path)?.write_all(text.as_bytes())
+    let folder = path.parent().unwrap_or(path);
+    let folders = missing_folders(folder);
+    let created = std::fs::create_dir_all(folder).and_then(|()| std::fs::File::create_new(path));
+    let written = created.and_then(|mut file| {
+        // A full disk leaves no half of it, and the next try finds the place free.
+        file.write_all(text.as_bytes()).inspect_err(|_| drop(std::fs::remove_file(path)))
+    });
+    written.inspect_err(|_| remove_folders(&folders))
 }

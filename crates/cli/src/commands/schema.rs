@@ -7,8 +7,8 @@ use crate::worlds;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::Value;
-use sidestep::kernel::InputError;
-use sidestep_session::display_path;
+use sidestep_session::{Error, display_path, write_atomically};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -78,9 +78,6 @@ fn schema_comment(file: &Path, schema: &Value) -> String {
     format!("Wrote {file}: {title}\nBegin such files with the line\n  #:schema {file}\n")
 }
 
-fn write(file: &Path, text: &str) -> Result<(), InputError> {
-    std::fs::write(file, text).map_err(|e| {
-        let remedy = "give a file in a folder where you may write";
-        InputError::new(file.display(), format!("cannot be written: {e}"), remedy)
-    })
+fn write(file: &Path, text: &str) -> Result<(), Error> {
+    write_atomically(file, |out| out.write_all(text.as_bytes()))
 }

@@ -1,7 +1,30 @@
 //! A full disk: the error describes how to replay the run, and the run continues once there is
 //! room.
 
-use crate::support::{SmallDisk, TestFolder};
+use crate::support::{SmallDisk, TestFolder, names};
+
+#[test]
+fn a_full_disk_leaves_nothing_of_a_new_file_and_all_of_an_old_one() {
+    let place = TestFolder::new();
+    let at = place.path("disk");
+    // Too small for either file.
+    let Some(_disk) = SmallDisk::mount(&at, "8k") else {
+        sidestep_testing::skip("this user may not mount a small disk");
+        return;
+    };
+    std::fs::write(at.join("old.json"), "old").expect("there is room");
+    for args in [
+        &["new", "robots", "disk/deep/er/n.toml"][..],
+        &["schema", "robots", "--out", "disk/old.json"],
+        &["schema", "robots", "--out", "disk/deep/s.json"],
+    ] {
+        let ended = place.run(args);
+        assert_ne!(ended.code(), 0, "{args:?}: {}", ended.out());
+        assert!(ended.err().contains("disk/"), "{}", ended.err());
+        assert_eq!(names(&at), ["old.json"], "{args:?}");
+        assert_eq!(place.read("disk/old.json"), "old", "{args:?}");
+    }
+}
 
 #[test]
 fn a_full_disk_fails_the_run_which_resumes_when_there_is_room() {

@@ -121,6 +121,15 @@ impl McapRecorder {
         origin: McapProvenance,
         scenery: &Scenery,
     ) -> Result<Self, RecordError> {
+        let made = disk::missing_folders(disk::parent(path));
+        Self::create_in_folder(path, origin, scenery).inspect_err(|_| disk::remove_folders(&made))
+    }
+
+    fn create_in_folder(
+        path: &Path,
+        origin: McapProvenance,
+        scenery: &Scenery,
+    ) -> Result<Self, RecordError> {
         let partial = disk::partial_path(path);
         let file = fs::create_dir_all(disk::parent(path)).and_then(|()| File::create(&partial));
         let file = file.map_err(|e| RecordError::new(path.display(), e))?;
