@@ -9,7 +9,7 @@
 //!
 //! The rows of a flight in real time must be on disk within a second. A file for each second would be too many files, so
 //! there a part [grows](ParquetRecorder::with_growing_parts): each seal replaces it by one with more rows, in one step,
-//! until it has those of [`MAX_SEALS`] seals.
+//! until it has those of 60 seals.
 
 use std::collections::BTreeMap;
 use std::fs;
