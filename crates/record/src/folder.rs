@@ -149,6 +149,10 @@ impl RunFolder {
         if !files.contains(SCENARIO) {
             files.insert(SCENARIO, FileDigest::of_bytes(scenario.as_bytes()));
         }
+        // A kill may have come between the checkpoint and the manifest, and the run may end without another one.
+        files.insert_file(path, CHECKPOINT).map_err(|e| {
+            InputError::new(path.display(), e.to_string(), "make the folder readable")
+        })?;
         let files = SharedFileList::new(files);
         let cycle_origin = CycleOrigin::Simulated;
         Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, lock })

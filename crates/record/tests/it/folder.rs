@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use sidestep_kernel::checkpoint::{CheckpointHeader, FORMAT_VERSION, encode};
 use sidestep_kernel::ports::Recorder;
 use sidestep_record::{IfExists, ResumePoint, RunFolder, RunReader, Status, read_table};
 
@@ -201,4 +202,31 @@ fn a_run_on_a_full_disk_keeps_its_checkpoint_and_goes_on_when_there_is_room() {
     recorder.finish().unwrap();
     folder.complete(20, "abcd").unwrap();
     assert_eq!(read_table(&path, "trajectories", ..).unwrap().rows(), 40);
+}
+
+#[test]
+fn a_run_that_was_killed_between_a_checkpoint_and_its_manifest_is_whole_when_it_has_gone_on() {
+    let parent = tempfile::tempdir().unwrap();
+    let path = parent.path().join("a");
+    let state = |cycle| {
+        let header = CheckpointHeader {
+            format: FORMAT_VERSION,
+            program_version: "0.1.0".into(),
+            world: "robots".into(),
+            scenario: [0; 16],
+            cycle,
+        };
+        encode(&header, &cycle)
+    };
+    let mut folder = create(&path);
+    folder.save_checkpoint(10, &state(10)).unwrap();
+    let manifest = fs::read(path.join("run.json")).unwrap();
+    folder.save_checkpoint(20, &state(20)).unwrap();
+    drop(folder);
+    fs::write(path.join("run.json"), manifest).unwrap();
+
+    let (folder, point) = RunFolder::resume(&path).unwrap();
+    assert_eq!(point, ResumePoint::Checkpoint(state(20)));
+    folder.complete(30, "abcd").unwrap();
+    RunReader::open(&path).unwrap().check_files(|_| true).unwrap();
 }
