@@ -127,7 +127,9 @@ fn a_run_whose_folder_is_deleted_moved_or_replaced_ends_at_once_and_writes_nowhe
         // Its first checkpoint is hours away, and no rows are due before.
         let args = ["--set", "record.checkpoint_every=1000000000"];
         let child = place.start(&[&ENDLESS[..], &args].concat());
-        wait_for("the folder", || place.path("r/trajectories.partial").exists());
+        // The last that it makes before its first cycle.
+        let tables = ["r/events.partial", "r/trajectories.partial"];
+        wait_for("the tables", || tables.iter().all(|table| place.path(table).exists()));
         let folder = place.path("r");
         match change {
             "deleted" => std::fs::remove_dir_all(&folder).expect("deleted"),
