@@ -58,7 +58,7 @@ mod tests {
             ("/runs/office.mcap", "../office.mcap", "there/office.mcap"),
             ("/runs/mcap/a.mcap", "../mcap/a.mcap", "there/mcap/a.mcap"),
             ("/runs/office/a.mcap", "a.mcap", "there/office/a.mcap"),
-            ("/tmp/a.mcap", "/tmp/a.mcap", "/tmp/a.mcap"),
+            ("/elsewhere/a.mcap", "/elsewhere/a.mcap", "/elsewhere/a.mcap"),
         ] {
             let request = McapRequest::new(Path::new("/runs/office"), Path::new(file), 20);
             let request = request.expect("text");
