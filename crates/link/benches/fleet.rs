@@ -273,7 +273,8 @@ fn cost(n: u32) {
 /// Returns what a super-conflict costs in this process, and its digest.
 fn cost_of_one_process(n: u32) -> (Cost, String) {
     let source = Source::new("s.toml", &*text(n, 1000), "");
-    let (began, cpu_s) = (Instant::now(), cpu_seconds());
+    let began = Instant::now();
+    let cpu_s = cpu_seconds();
     let compiled = WORLDS.compile(&source).expect("a scenario");
     let run = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, OutputPaths::default())
         .expect("started");
@@ -287,7 +288,8 @@ fn cost_of_one_process(n: u32) -> (Cost, String) {
 fn cost_of_fleet(n: u32, cycles: u64) -> (Cost, String) {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("s.toml"), text(n, cycles)).expect("written");
-    let (began, cpu_s) = (Instant::now(), cpu_seconds());
+    let began = Instant::now();
+    let cpu_s = cpu_seconds();
     let (digest, _) = fly(job(folder.path(), ClockMode::Lockstep), |_| true);
     let wall_s = began.elapsed().as_secs_f64();
     (Cost { cpu_s: cpu_seconds() - cpu_s, wall_s }, digest)

@@ -23,8 +23,8 @@ use std::fmt;
 use std::sync::Arc;
 use x509_parser::prelude::{FromDer, X509Certificate};
 
-/// Bytes that a signature adds to a frame.
-pub const SIGNATURE_BYTES: usize = 64;
+/// Bytes that a signature adds to a frame: as many as the budget of a radio counts.
+pub use sidestep::kernel::network::SIGNATURE_BYTES;
 
 /// First bytes of what a certificate's key signs, so that no other signature by it can be taken for one.
 const CONTEXT: &[u8] = b"sidestep session key 1";

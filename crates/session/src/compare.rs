@@ -107,8 +107,8 @@ fn bits_by_body<'a>(
     all
 }
 
-/// Returns the bits of a value; tables of poses have no text.
-fn bits(values: &ColumnValues, row: usize) -> u64 {
+/// Returns the bits of a value that is no text.
+pub(crate) fn bits(values: &ColumnValues, row: usize) -> u64 {
     match values {
         ColumnValues::Text(_) => 0,
         ColumnValues::I64(v) => v[row] as u64,

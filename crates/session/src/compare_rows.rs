@@ -4,6 +4,7 @@
 //! of cycles only the number of rows and the sum of their hashes is kept, so that tables may be larger than memory.
 
 use crate::Error;
+use crate::compare::bits;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
 use sidestep_record::{for_each_block, tables};
@@ -109,19 +110,6 @@ fn cell_hash(values: &ColumnValues, row: usize) -> u64 {
             text.bytes().fold(2, |hash, byte| mix(hash, byte.into()))
         }
         _ => mix(3, bits(values, row)),
-    }
-}
-
-/// Returns the bits of a value that is no text.
-fn bits(values: &ColumnValues, row: usize) -> u64 {
-    match values {
-        ColumnValues::Text(_) => 0,
-        ColumnValues::I64(v) => v[row] as u64,
-        ColumnValues::Bool(v) => v[row].into(),
-        ColumnValues::U32(v) | ColumnValues::Label(v) => v[row].into(),
-        ColumnValues::U64(v) => v[row],
-        ColumnValues::I32(v) => v[row] as u64,
-        ColumnValues::F64(v) => v[row].to_bits(),
     }
 }
 

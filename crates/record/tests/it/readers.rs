@@ -1,5 +1,6 @@
 //! Files read by other programs.
 
+use std::path::PathBuf;
 use std::process::Command;
 
 use sidestep_kernel::ports::Recorder;
@@ -17,14 +18,20 @@ print(','.join(t['heading'].to_pylist()[:12:4]), t['heading'].to_pylist().count(
 print(pq.read_metadata(sys.argv[1] + '/part-000000000000000.parquet').metadata[b'sidestep.seed'])
 ";
 
+/// Returns a Python that has pyarrow; `None`, with a reason in the output, where there is none.
+fn python_with_pyarrow() -> Option<PathBuf> {
+    let python = sidestep_testing::python();
+    let tried = Command::new(&python).args(["-c", "import pyarrow.parquet"]).output();
+    let has_pyarrow = tried.is_ok_and(|o| o.status.success());
+    if !has_pyarrow {
+        sidestep_testing::skip(format!("{} has no pyarrow", python.display()));
+    }
+    has_pyarrow.then_some(python)
+}
+
 #[test]
 fn pyarrow_reads_a_folder_of_parts_as_one_table() {
-    let python = sidestep_testing::python();
-    let has_pyarrow = Command::new(&python).args(["-c", "import pyarrow.parquet"]).output();
-    if !has_pyarrow.is_ok_and(|o| o.status.success()) {
-        sidestep_testing::skip(format!("{} has no pyarrow", python.display()));
-        return;
-    }
+    let Some(python) = python_with_pyarrow() else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = recorder(folder.path());
     recorder.append(0, &rows(0, 500)).unwrap();
@@ -55,12 +62,7 @@ except OSError as error:
 
 #[test]
 fn pyarrow_notices_a_flipped_bit_in_a_page_by_its_checksum() {
-    let python = sidestep_testing::python();
-    let has_pyarrow = Command::new(&python).args(["-c", "import pyarrow.parquet"]).output();
-    if !has_pyarrow.is_ok_and(|o| o.status.success()) {
-        sidestep_testing::skip(format!("{} has no pyarrow", python.display()));
-        return;
-    }
+    let Some(python) = python_with_pyarrow() else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut recorder = recorder(folder.path());
     recorder.append(0, &rows(0, 500)).unwrap();
