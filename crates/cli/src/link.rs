@@ -27,7 +27,8 @@ pub(crate) struct LinkArgs {
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = parse_seconds)]
     lease: f64,
 
-    /// Serve metrics in Prometheus format at this address, e.g. 127.0.0.1:9100
+    /// Serve metrics in Prometheus format at this address, e.g. 127.0.0.1:9100; one that others
+    /// reach needs certificates or --insecure
     #[arg(long, value_name = "HOST:PORT")]
     metrics: Option<String>,
 

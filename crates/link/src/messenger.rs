@@ -311,17 +311,6 @@ impl Messenger {
         self.wire.send(&peers, &frame);
     }
 
-    /// Counts the frames whose sender is not who they say, and warns of them.
-    fn count_forged(&mut self) {
-        let forged = self.wire.take_forged();
-        if forged > 0 {
-            let count = self.stats.dropped.entry(drop_reason::FORGED).or_default();
-            *count += forged;
-            let count = *count;
-            tracing::warn!(me = %self.me, count, "frames whose sender is not who they say are refused");
-        }
-    }
-
     fn count_drop(&mut self, reason: &'static str) {
         *self.stats.dropped.entry(reason).or_default() += 1;
     }
@@ -332,7 +321,7 @@ impl Messenger {
         self.count_drop(reason);
         let count = self.stats.dropped[reason];
         if count.is_power_of_two() {
-            tracing::warn!(me = %self.me, reason, count, "frames are dropped: they were changed or repeated on the way");
+            tracing::warn!(me = %self.me, reason, count, "frames are dropped: they were changed, repeated or forged on the way");
         }
     }
 
@@ -397,7 +386,10 @@ impl Messenger {
                 self.peers.values().filter_map(|state| state.link.next_send_time()).min();
             let wake_at = next_due.map_or(until, |due| due.min(until));
             let bytes = self.wire.receive(wake_at.saturating_sub(now));
-            self.count_forged();
+            // The wire has dropped these by their keys.
+            for _ in 0..self.wire.take_forged() {
+                self.count_bad_frame(drop_reason::FORGED);
+            }
             self.listened_at = self.now();
             self.excuse_absence(self.listened_at.saturating_sub(wake_at));
             if let Some(bytes) = bytes {

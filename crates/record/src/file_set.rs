@@ -18,13 +18,13 @@ pub struct FileSet {
     /// The list of the files that are replaced, if there is one.
     old: Option<FileManifest>,
     new: FileManifest,
-    staged: Vec<StagedFile>,
+    staged: Vec<TemporaryFile>,
     /// Folders that were created for the files, the outermost first.
     made: Vec<PathBuf>,
 }
 
 /// A file that is whole under a temporary name.
-struct StagedFile {
+struct TemporaryFile {
     name: String,
     partial: PathBuf,
     target: PathBuf,
@@ -98,7 +98,7 @@ impl FileSet {
             .map_err(|e| RecordError::new(target.display(), e))?;
         let partial = free_name(&target);
         // Known before it is made, so that a half-written file is deleted too.
-        self.staged.push(StagedFile { name: name.into(), partial: partial.clone(), target });
+        self.staged.push(TemporaryFile { name: name.into(), partial: partial.clone(), target });
         make(&partial)
     }
 

@@ -1,6 +1,6 @@
 //! Comparison of all rows of a run that is computed again with the recorded ones.
 //!
-//! Rows are compared as sets, because a run that was stopped in between recorded them in other blocks. Of each stretch
+//! Rows are compared as sets, because a run that was stopped in between recorded them in other blocks. Of each segment
 //! of cycles only the number of rows and the sum of their hashes is kept, so that tables may be larger than memory.
 
 use crate::Error;
@@ -11,10 +11,10 @@ use sidestep_record::{for_each_block, tables};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Cycles of a stretch: a difference is told with its stretch.
-const STRETCH_CYCLES: u64 = 100;
+/// Cycles of a segment: a difference is told with its segment.
+const SEGMENT_CYCLES: u64 = 100;
 
-/// Number of rows of a stretch, and the sum of their hashes.
+/// Number of rows of a segment, and the sum of their hashes.
 type RowSums = BTreeMap<u64, (u64, u64)>;
 
 /// The rows of a run so far, for comparison with a folder.
@@ -47,8 +47,8 @@ impl RowComparison {
                 add_rows(&block.schema, &block.columns, &mut stored);
                 Ok(())
             })?;
-            if let Some(stretch) = first_difference(computed, &stored) {
-                return Err(mismatch(folder, schema, stretch));
+            if let Some(segment) = first_difference(computed, &stored) {
+                return Err(mismatch(folder, schema, segment));
             }
             rows += stored.values().map(|(count, _)| count).sum::<u64>();
         }
@@ -69,9 +69,9 @@ impl Recorder for RowComparison {
     }
 }
 
-fn mismatch(folder: &Path, schema: &TableSchema, stretch: u64) -> Error {
-    let from = stretch * STRETCH_CYCLES;
-    let until = from + STRETCH_CYCLES - 1;
+fn mismatch(folder: &Path, schema: &TableSchema, segment: u64) -> Error {
+    let from = segment * SEGMENT_CYCLES;
+    let until = from + SEGMENT_CYCLES - 1;
     let place = folder.join(&schema.name);
     let cause = if schema.columns.iter().any(|column| column.name == "cycle") {
         format!("the rows of cycles {from} to {until} differ from those of the run computed again")
@@ -82,9 +82,9 @@ fn mismatch(folder: &Path, schema: &TableSchema, stretch: u64) -> Error {
     Error::other(format!("{}: {cause}", place.display()), remedy)
 }
 
-/// Returns the first stretch with other rows.
+/// Returns the first segment with other rows.
 fn first_difference(a: &RowSums, b: &RowSums) -> Option<u64> {
-    let differs = |stretch: &&u64| a.get(stretch) != b.get(stretch);
+    let differs = |segment: &&u64| a.get(segment) != b.get(segment);
     a.keys().chain(b.keys()).filter(differs).min().copied()
 }
 
@@ -92,9 +92,9 @@ fn add_rows(schema: &TableSchema, columns: &[ColumnValues], sums: &mut RowSums) 
     let cycle = schema.columns.iter().position(|column| column.name == "cycle");
     let cycles = cycle.and_then(|index| columns.get(index));
     for row in 0..columns.first().map_or(0, ColumnValues::len) {
-        let stretch = cycles.map_or(0, |cycles| bits(cycles, row) / STRETCH_CYCLES);
+        let segment = cycles.map_or(0, |cycles| bits(cycles, row) / SEGMENT_CYCLES);
         let hash = columns.iter().fold(0, |hash, values| mix(hash, cell_hash(values, row)));
-        let (count, sum) = sums.entry(stretch).or_default();
+        let (count, sum) = sums.entry(segment).or_default();
         *count += 1;
         *sum = sum.wrapping_add(hash);
     }
