@@ -33,8 +33,8 @@ impl DistributedAirspace {
     pub(crate) fn new(world: Arc<AirspaceWorld>) -> Result<Self, (&'static str, &'static str)> {
         if world.deployment == Deployment::Direct {
             let cause = "one process decides for all airplanes (deployment = \"direct\")";
-            let remedy = "add --set airspace.deployment=compact-team, or another one of team, pim and \
-                          hierarchical-pim";
+            let remedy = "add --set airspace.deployment=compact-team, or another one of team, replica-team, \
+                          pim and hierarchical-pim";
             return Err((cause, remedy));
         }
         Ok(Self { world })

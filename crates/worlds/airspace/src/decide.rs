@@ -15,6 +15,7 @@ use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, build_group_game};
 use super::purpose;
+use super::settings::Deployment;
 use super::shield::TurnProfile;
 use super::world::AirspaceWorld;
 pub(super) use group_memory::max_group_memory_bytes;
@@ -118,6 +119,11 @@ impl DecisionStrategy {
         }
     }
 
+    /// Returns whether an airplane that knows the intentions of all finds its own decision by itself.
+    pub(super) fn needs_intents_alone(world: &AirspaceWorld) -> bool {
+        Self::is_reactive(world) || world.deployment == Deployment::ReplicaTeam
+    }
+
     /// Returns whether the method gives headings by the positions and goals of all.
     pub(super) fn is_reactive(world: &AirspaceWorld) -> bool {
         matches!(world.method, MethodKind::Mvp | MethodKind::Orca | MethodKind::Own(_))
@@ -184,21 +190,33 @@ pub(super) fn decide_centrally(
     non_cooperative: &[NonCooperativeAircraft],
     now: Cycle,
 ) -> Vec<Option<ActionChoice>> {
-    let options: Vec<ActionPredictions> =
-        group.iter().map(|known| world.action_predictions(*known, non_cooperative)).collect();
-    let game = build_group_game(&world.objective, &options);
+    let mut ids = Vec::new();
+    let mut options = Vec::new();
+    for known in group {
+        ids.push(known.slot);
+        options.push(world.action_predictions(*known, non_cooperative));
+    }
+    decide_by_predictions(world, &ids, &options, now).into_iter().map(Some).collect()
+}
+
+/// Decides for all airplanes of a group, by the predictions of their actions.
+pub(super) fn decide_by_predictions(
+    world: &AirspaceWorld,
+    ids: &[EntityId],
+    options: &[ActionPredictions],
+    now: Cycle,
+) -> Vec<ActionChoice> {
+    let game = build_group_game(&world.objective, options);
     let outcome = optimize(&game, &world.settings, |player: usize, k: u64| {
-        purpose::sample(&world.streams, group[player].slot, now, k)
+        purpose::sample(&world.streams, ids[player], now, k)
     });
     let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
-    each.map(|((chosen, expected), chances)| {
-        Some(ActionChoice {
-            chosen,
-            expected,
-            rounds: outcome.rounds,
-            converged: outcome.converged,
-            chances,
-        })
+    each.map(|((chosen, expected), chances)| ActionChoice {
+        chosen,
+        expected,
+        rounds: outcome.rounds,
+        converged: outcome.converged,
+        chances,
     })
     .collect()
 }

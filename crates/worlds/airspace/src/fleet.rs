@@ -113,7 +113,7 @@ impl AirspaceWorld {
     ) -> Result<(), OrderError> {
         if self.deployment == Deployment::Direct {
             let cause = "one process decides for all (deployment = \"direct\"); set deployment to team, \
-                         compact-team, pim or hierarchical-pim";
+                         compact-team, replica-team, pim or hierarchical-pim";
             return Err(OrderError::NoExternalAgents { cause: cause.into() });
         }
         let percepts = self.percepts(state, now);

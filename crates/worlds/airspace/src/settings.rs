@@ -90,6 +90,8 @@ pub enum Deployment {
     HierarchicalPim,
     /// An agent per airplane, which sends its model.
     CompactTeam,
+    /// An agent per airplane, which decides for all by the same computation as the others.
+    ReplicaTeam,
 }
 
 impl Deployment {
@@ -101,6 +103,7 @@ impl Deployment {
             Self::Pim => "pim",
             Self::HierarchicalPim => "hierarchical-pim",
             Self::CompactTeam => "compact-team",
+            Self::ReplicaTeam => "replica-team",
         }
     }
 
@@ -109,7 +112,9 @@ impl Deployment {
         let sampled = matches!(settings.estimator, Estimator::Sampled { .. });
         let as_in_the_paper =
             settings.order == UpdateOrder::Parallel && settings.utility == Utility::Joint;
-        (self != Self::Direct && sampled && !as_in_the_paper)
+        // Where one computation decides for all, nobody waits for another one's update.
+        let decides_at_once = matches!(self, Self::Direct | Self::ReplicaTeam);
+        (!decides_at_once && sampled && !as_in_the_paper)
             .then_some("agents that sample update in parallel and learn from the joint cost")
     }
 }

@@ -31,7 +31,7 @@ fn the_golden_digests_of_agents_are_what_every_machine_gets() {
     let mut found = String::new();
     for network in ["", FAULTS] {
         for preset in ["default", "paper"] {
-            for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+            for deployment in ["team", "compact-team", "replica-team", "pim", "hierarchical-pim"] {
                 found += &digest_and_traffic(preset, deployment, network);
             }
         }

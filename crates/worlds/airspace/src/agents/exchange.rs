@@ -45,13 +45,14 @@
 //! because two airplanes go first in turn.
 
 mod setup;
+mod turn_runs;
 
-use super::link::{self, MessageLimits};
+use super::link::{self, MessageLimits, to_bytes};
 use super::participant::InvalidMessage;
 use super::traffic_state::{
     LastKnownState, OrbitState, PlanEnd, StateBeacon, TrafficPicture, record_beacon,
 };
-use crate::flight::Pose2;
+use crate::flight::{FlightLevelRange, Pose2};
 use crate::shield::{
     ExemptIds, OrbitSide, PlanCertainty, SafeManeuver, ShieldDecision, ShieldedAircraft,
     TurnProfile, filter_maneuvers,
@@ -66,37 +67,71 @@ use std::sync::Arc;
 pub enum ShieldExchangeMessage {
     /// Position of the sender, and the profiles it would fly.
     Proposal(Proposal),
-    /// The profile that it will fly if all agree, and the side to which it turns then; `None` for its
-    /// fallback.
-    Plan(Option<(TurnProfile, OrbitSide)>),
+    /// The plan that it will fly if all agree; `None` for its fallback.
+    Plan(Option<Plan>),
     /// Ids of the airplanes whose plans it accepts, rising.
     Accepts(Vec<EntityId>),
 }
 
-/// Position of an airplane, and the profiles it would fly.
+/// A profile that an airplane has proposed, and the side to which it turns after it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Plan {
+    /// The place of the profile in its proposal.
+    profile: u32,
+    side: OrbitSide,
+}
+
+/// What an airplane says of itself, and the profiles it would fly. What all see of it, or have on file, is left out.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Proposal {
-    beacon: StateBeacon,
-    /// Its pose on the stored orbit, as all see it.
-    orbit_pose: Pose2,
+    /// Airspeed in meters per second, if it is not as filed.
+    v_m_s: Option<f64>,
+    /// The levels that it is on and changes to, if they are not as seen and filed.
+    levels: Option<FlightLevelRange>,
+    /// Its pose on the stored orbit, if that is not where all see it.
+    orbit_pose: Option<Pose2>,
     fallback: OrbitSide,
     exempt: Vec<EntityId>,
     rank: u64,
+    #[serde(with = "turn_runs")]
     profiles: Vec<TurnProfile>,
 }
 
 impl Proposal {
     /// Returns the proposal of an airplane: the profiles that it may fly, the preferred one first.
-    pub fn new(aircraft: &ShieldedAircraft, profiles: &[TurnProfile]) -> Self {
+    pub fn new(own: &ObservedAircraft, profiles: &[TurnProfile]) -> Self {
+        let ObservedAircraft { aircraft, filed_v_m_s, filed_levels, .. } = own;
         Self {
-            beacon: StateBeacon::from_aircraft(aircraft),
-            orbit_pose: aircraft.orbit_pose,
+            v_m_s: unless_known(aircraft.v_m_s, *filed_v_m_s),
+            levels: unless_known(aircraft.levels, *filed_levels),
+            orbit_pose: unless_known(aircraft.orbit_pose, aircraft.pose),
             fallback: aircraft.fallback,
             exempt: aircraft.exempt.to_vec(),
             rank: aircraft.rank,
             profiles: profiles.to_vec(),
         }
     }
+
+    /// Leaves out the profiles that it prefers least until the message takes so many bytes at most; one stays.
+    fn truncate_to_bytes(&mut self, max_bytes: usize) {
+        while self.profiles.len() > 1 && to_bytes(&self).len() > max_bytes {
+            self.profiles.pop();
+        }
+    }
+
+    /// Returns how its airplane describes itself, with all that others see of it or have on file.
+    fn beacon(&self, observed: &ObservedAircraft) -> StateBeacon {
+        StateBeacon {
+            v_m_s: self.v_m_s.unwrap_or(observed.filed_v_m_s),
+            levels: self.levels.unwrap_or(observed.filed_levels),
+            ..StateBeacon::from_aircraft(&observed.aircraft)
+        }
+    }
+}
+
+/// Returns what must be said of a value: nothing if it is the one that others know.
+fn unless_known<T: PartialEq>(value: T, known: T) -> Option<T> {
+    (value != known).then_some(value)
 }
 
 /// Another member of the group.
@@ -104,7 +139,7 @@ impl Proposal {
 struct ShieldExchangeMember {
     proposal: Option<Proposal>,
     /// Its plan, when it is known; `Some(None)` stands for its fallback.
-    plan: Option<Option<(TurnProfile, OrbitSide)>>,
+    plan: Option<Option<Plan>>,
     accepts: Option<Vec<EntityId>>,
     gone: bool,
 }
@@ -159,11 +194,14 @@ impl ShieldExchangeAgent {
         profiles: &[TurnProfile],
         contacts: TrafficPicture,
     ) -> Self {
-        let aircraft = setup.aircraft[me].aircraft.clone();
+        let mut own = Proposal::new(&setup.aircraft[me], profiles);
+        if let Some(max_bytes) = setup.max_proposal_bytes {
+            own.truncate_to_bytes(max_bytes);
+        }
         Self {
             me,
-            own: Proposal::new(&aircraft, profiles),
-            aircraft,
+            own,
+            aircraft: setup.aircraft[me].aircraft.clone(),
             contacts,
             members: setup.aircraft.iter().map(ShieldExchangeMember::new).collect(),
             setup,
@@ -194,18 +232,20 @@ impl ShieldExchangeAgent {
     }
 
     fn aircraft_from_proposal(&self, place: usize, proposal: &Proposal) -> ShieldedAircraft {
-        let Proposal { beacon, orbit_pose, fallback, exempt, rank, .. } = proposal;
+        let observed = &self.setup.aircraft[place];
+        let Proposal { v_m_s, levels, orbit_pose, fallback, exempt, rank, .. } = proposal;
+        let seen = &observed.aircraft;
         ShieldedAircraft {
             id: self.id(place),
-            frame: self.setup.air.surface.frame_at(beacon.pose.at),
-            pose: beacon.pose,
-            orbit_pose: *orbit_pose,
-            v_m_s: beacon.v_m_s,
-            omega_max_rad_s: beacon.omega_max_rad_s,
-            orbit_rad_s: beacon.orbit_rad_s,
-            separation_m: beacon.separation_m,
-            error_m: self.setup.aircraft[place].aircraft.error_m,
-            levels: beacon.levels,
+            frame: self.setup.air.surface.frame_at(seen.pose.at),
+            pose: seen.pose,
+            orbit_pose: orbit_pose.unwrap_or(seen.pose),
+            v_m_s: v_m_s.unwrap_or(observed.filed_v_m_s),
+            omega_max_rad_s: seen.omega_max_rad_s,
+            orbit_rad_s: seen.orbit_rad_s,
+            separation_m: seen.separation_m,
+            error_m: seen.error_m,
+            levels: levels.unwrap_or(observed.filed_levels),
             vertical_m: self.setup.vertical_m,
             fallback: *fallback,
             exempt: exempt.as_slice().into(),
@@ -316,34 +356,35 @@ impl ShieldExchangeAgent {
     fn send_plan(&mut self) -> ShieldExchangeMessage {
         let decision = self.compute_own_decision();
         self.decision = Some(decision);
-        let plan = decision.candidate.map(|k| (self.own.profiles[k].clone(), decision.fallback));
+        let side = decision.fallback;
+        let plan = decision.candidate.map(|k| Plan { profile: k as u32, side });
         // Its fallback needs no consent, because all others keep apart from it anyway.
-        self.asked = if plan.is_some() {
-            self.consent_members(&self.plan_of(self.aircraft.clone(), &plan))
-        } else {
-            Vec::new()
-        };
-        self.members[self.me].plan = Some(plan.clone());
+        self.asked =
+            if plan.is_some() { self.consent_members(&self.own_plan(plan)) } else { Vec::new() };
+        self.members[self.me].plan = Some(plan);
         ShieldExchangeMessage::Plan(plan)
     }
 
-    /// Returns the plan of a member, from its message.
+    fn own_plan(&self, plan: Option<Plan>) -> SafeManeuver {
+        self.plan_of(self.aircraft.clone(), &self.own, plan).expect("it has proposed it")
+    }
+
+    /// Returns the plan of a member, from its messages; `None` if it has not proposed that.
     fn plan_of(
         &self,
         aircraft: ShieldedAircraft,
-        plan: &Option<(TurnProfile, OrbitSide)>,
-    ) -> SafeManeuver {
-        match plan {
-            Some((profile, side)) => SafeManeuver::new(aircraft, profile, self.dtau_s(), *side),
-            None => self.fallback(aircraft),
-        }
+        proposal: &Proposal,
+        plan: Option<Plan>,
+    ) -> Option<SafeManeuver> {
+        let Some(Plan { profile, side }) = plan else { return Some(self.fallback(aircraft)) };
+        let profile = proposal.profiles.get(profile as usize)?;
+        Some(SafeManeuver::new(aircraft, profile, self.dtau_s(), side))
     }
 
     /// Accepts the plans that keep apart from both its own plan and its own fallback.
     fn accept_plans(&mut self) -> ShieldExchangeMessage {
-        let own = self.members[self.me].plan.clone().flatten();
-        let mine =
-            [self.plan_of(self.aircraft.clone(), &own), self.fallback(self.aircraft.clone())];
+        let own = self.members[self.me].plan.flatten();
+        let mine = [self.own_plan(own), self.fallback(self.aircraft.clone())];
         let mut accepts = Vec::new();
         for place in (0..self.group_size()).filter(|&place| place != self.me) {
             let ShieldExchangeMember { proposal: Some(proposal), plan: Some(plan), .. } =
@@ -351,11 +392,10 @@ impl ShieldExchangeAgent {
             else {
                 continue;
             };
-            // A plan that was not proposed has not been compared with those of others.
-            let is_proposed =
-                plan.as_ref().is_none_or(|(profile, _)| proposal.profiles.contains(profile));
-            let theirs = self.plan_of(self.aircraft_from_proposal(place, proposal), plan);
-            if is_proposed && mine.iter().all(|plan| plan.is_compatible(&theirs)) {
+            let aircraft = self.aircraft_from_proposal(place, proposal);
+            // A plan that was not proposed is nothing that could be flown.
+            let Some(theirs) = self.plan_of(aircraft, proposal, *plan) else { continue };
+            if mine.iter().all(|plan| plan.is_compatible(&theirs)) {
                 accepts.push(self.id(place));
             }
         }
@@ -409,7 +449,8 @@ impl ShieldExchangeAgent {
             let id = self.id(place);
             let aircraft = match &member.proposal {
                 Some(proposal) => {
-                    record_beacon(&mut contacts, id, proposal.beacon.clone(), now);
+                    let beacon = proposal.beacon(&self.setup.aircraft[place]);
+                    record_beacon(&mut contacts, id, beacon, now);
                     self.aircraft_from_proposal(place, proposal)
                 }
                 None => self.possible_orbits(place).swap_remove(0),
@@ -422,7 +463,7 @@ impl ShieldExchangeAgent {
             let is_heard = member.proposal.is_some();
             // If it is seen to fly a profile, it has flown the plan that it has sent.
             let planned = member.plan.as_ref().and_then(Option::as_ref);
-            contact.planned = planned.map(|(_, side)| PlanEnd { as_of: now + 1, side: *side });
+            contact.planned = planned.map(|plan| PlanEnd { as_of: now + 1, side: plan.side });
             contact.presumed = Some(self.orbit_after_plan(&self.fallback(aircraft)));
             contact.unheard_in = (!is_heard).then_some(now);
         }
@@ -457,7 +498,9 @@ impl link::ProtocolAgent for ShieldExchangeAgent {
         match message {
             ShieldExchangeMessage::Proposal(proposal) => self.setup.check_proposal(from, proposal),
             ShieldExchangeMessage::Plan(plan) => {
-                plan.iter().try_for_each(|(profile, _)| self.setup.check_profile(from, profile))
+                let is_possible =
+                    |plan: &Plan| (plan.profile as usize) < self.setup.aircraft[from].max_profiles;
+                InvalidMessage::Length.ensure(plan.as_ref().is_none_or(is_possible))
             }
             ShieldExchangeMessage::Accepts(accepted) => self.setup.check_members(accepted),
         }

@@ -223,7 +223,7 @@ impl Ownship {
     }
 
     /// Returns the predictions for another one that is not heard.
-    pub(super) fn presumed_predictions(&self, other: usize) -> ActionPredictions {
+    pub(crate) fn presumed_predictions(&self, other: usize) -> ActionPredictions {
         let id = self.common.ids[other];
         let filed = &self.common.filed[other].contact;
         let frame = self.common.frame(other);

@@ -16,6 +16,8 @@ pub(crate) fn max_group_memory_bytes(world: &AirspaceWorld, group: &[KnownAircra
         (Deployment::Direct | Deployment::Pim | Deployment::HierarchicalPim, _) => {
             tables + predictions
         }
+        // Each agent decides for all.
+        (Deployment::ReplicaTeam, _) => members * (tables + predictions),
         // Each agent has the tables of its own pairs, and the predictions of all.
         (Deployment::Team | Deployment::CompactTeam, Estimator::Exact) => {
             2 * tables + members * predictions

@@ -4,7 +4,9 @@ use crate::agents::{
     Conversation, ConversationEnd, ConversationSetup, EndpointConfig, FinishableParticipant,
     InvalidMessage, MessageLimits, ProtocolAgent, ReliableEndpoint,
 };
-use crate::pilot::{ConversationId, ConversationSchedule, Protocol, retry_policy};
+use crate::pilot::{
+    ConversationId, ConversationSchedule, ConversationWindows, Protocol, retry_policy,
+};
 use crate::purpose;
 use proptest::prelude::*;
 use sidestep_kernel::network::{
@@ -176,8 +178,9 @@ fn sums(
     rounds: u32,
 ) -> Vec<ConversationEnd<u64>> {
     let members: Arc<[u32]> = (0..group as u32).map(|id| 3 * id).collect();
+    let windows = network.map(|network| ConversationWindows::new(network, 1.0));
     let (schedule, streams) =
-        (ConversationSchedule::for_cycle(3, network), Streams::new(Seed(seed)));
+        (ConversationSchedule::for_cycle(3, windows), Streams::new(Seed(seed)));
     let (begins, ends) = schedule.conversation_tick_range(Protocol::Decision, schedule.begins);
     let station = |me: usize| {
         let id = members[me];

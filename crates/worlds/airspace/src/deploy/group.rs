@@ -23,7 +23,7 @@ pub(crate) fn decide_group(
 ) -> Vec<(AirplaneControl, ManeuverCandidates)> {
     let PhaseContext { world, state, now, clock, .. } = *context;
     let start_ns = clock.thread_cpu_ns();
-    let schedule = ConversationSchedule::for_cycle(now, world.network.as_ref());
+    let schedule = ConversationSchedule::for_cycle(now, world.conversation_windows());
     let percepts = flown.percepts(context, non_cooperative);
     let conversations = world.scheduled_conversation_times(now, schedule);
     let mut network = conversation_network(world, state, &conversations);
@@ -91,7 +91,8 @@ impl AirspaceWorld {
     ) -> [(u64, f64); 2] {
         let starts_s = self.cycle_start_s(now);
         let deadline_s = self.network.as_ref().map_or(0.0, |network| network.deadline_s);
-        [(schedule.begins, starts_s), (schedule.shield_from, starts_s + deadline_s)]
+        let exchange_s = starts_s + deadline_s * self.decision_fraction();
+        [(schedule.begins, starts_s), (schedule.shield_from, exchange_s)]
     }
 
     /// Returns the faults of the packets that an airplane sends where each is flown by a process of its own; none
@@ -104,7 +105,7 @@ impl AirspaceWorld {
     pub fn conversation_times(&self, now: Cycle) -> [(u64, f64); 2] {
         self.scheduled_conversation_times(
             now,
-            ConversationSchedule::for_cycle(now, self.network.as_ref()),
+            ConversationSchedule::for_cycle(now, self.conversation_windows()),
         )
     }
 

@@ -7,6 +7,8 @@
 //!   exact ones it sends the ways of all its actions once, and then its distribution.
 //! - `compact-team`: the same, but an agent sends its state and model once, from which the others
 //!   predict its ways themselves; then only its samples' numbers, or its distribution.
+//! - `replica-team`: an agent sends once where it is and intends to go, and each makes the whole computation for all,
+//!   with the same result. Fewest messages, and the most computation.
 //! - `pim`: one coordinator whose state migrates from airplane to airplane (the paper's process
 //!   integrated mechanism) and reads an airplane's model only while it is there.
 //! - `hierarchical-pim`: a coordinator for each part of the group, and one above them.
@@ -55,7 +57,7 @@ mod tests {
         for (preset, more) in [("default", ""), ("default", parallel), ("paper", "")] {
             let (direct, alone) = flown(preset, "direct", more);
             assert_eq!((alone.messages, alone.bytes), (0, 0));
-            for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
+            for deployment in ["team", "compact-team", "replica-team", "pim", "hierarchical-pim"] {
                 let (digest, metrics) = flown(preset, deployment, more);
                 assert_eq!(digest, direct, "{deployment}, {preset} {more}");
                 assert_eq!(metrics.rounds_mean, alone.rounds_mean);
@@ -232,6 +234,27 @@ mod tests {
             assert!(metrics.budget_dropped > 0, "{what}");
             assert_eq!(metrics.losses_of_separation, 0, "{what}");
         }
+    }
+
+    /// A radio of 31.5 kbit/s: what it defers, it carries in time, with the proposals of all.
+    #[test]
+    fn a_replica_team_of_ten_flies_on_a_slow_radio_as_on_one_without_a_limit() {
+        let flown = |budget_bytes_s: &str| {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\nseed = 1\n[airspace]\ndeployment = \"replica-team\"\n\
+                 network = {{ budget_bytes_s = {budget_bytes_s} }}\n\
+                 [airspace.generator]\nkind = \"superconflict\"\nn = 10\n"
+            );
+            let mut run = airspace_run(&Source::new("s", text, ""), 1).expect("a scenario");
+            run.advance(88);
+            (run.metrics(), run.digest())
+        };
+        let (slow, digest) = flown("3937.0");
+        let (fast, fast_digest) = flown("1e9");
+        assert_eq!(digest, fast_digest);
+        assert_eq!((slow.arrived, slow.budget_dropped, slow.losses_of_separation), (10, 0, 0));
+        assert!(slow.budget_deferred > 0 && fast.budget_deferred == 0);
+        assert_eq!(slow.multicasts, fast.multicasts);
     }
 
     /// A budget that is never spent defers messages by a tick or two, and changes no flight.

@@ -72,7 +72,7 @@ pub(super) fn filed_flight(world: &AirspaceWorld, id: EntityId) -> FiledFlight {
 }
 
 /// Returns the message in which an airplane describes itself.
-fn beacon(world: &AirspaceWorld, known: KnownAircraft) -> StateBeacon {
+pub(super) fn beacon(world: &AirspaceWorld, known: KnownAircraft) -> StateBeacon {
     let segment = world.segment(known.slot, known.orders);
     StateBeacon {
         pose: known.pose,
@@ -119,12 +119,17 @@ pub(super) fn shield_exchange_setup(
     all.sort_unstable_by_key(|(one, _)| one.id);
     let mut aircraft = Vec::with_capacity(all.len());
     for (one, takes_part) in all {
+        let seen = shielded_aircraft_from_report(world, &percept.own, one);
+        let filed_v_m_s = seen.v_m_s;
+        let filed_levels = seen.levels;
         aircraft.push(ObservedAircraft {
             aircraft: if one.id == percept.own.id {
                 percept.own.shielded_aircraft(world)
             } else {
-                shielded_aircraft_from_report(world, &percept.own, one)
+                seen
             },
+            filed_v_m_s,
+            filed_levels,
             is_on_orbit: one.orbit.is_some(),
             takes_part,
             max_speed_m_s: world.top_m_s[one.id as usize],
@@ -138,6 +143,7 @@ pub(super) fn shield_exchange_setup(
         now: percept.cycle,
         certainty: plan_certainty(world),
         airplanes: world.airplanes.len(),
+        max_proposal_bytes: world.max_proposal_bytes(),
         aircraft,
     }
 }

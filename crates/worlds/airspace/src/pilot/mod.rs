@@ -39,5 +39,5 @@ pub use percept::{OwnshipState, Percept, SurveillanceReport};
 pub use program::Pilot;
 pub(crate) use schedule::ConversationSchedule;
 #[cfg(test)]
-pub(crate) use schedule::retry_policy;
+pub(crate) use schedule::{ConversationWindows, retry_policy};
 pub use sidestep_kernel::network::{DropCounts, DropReason};

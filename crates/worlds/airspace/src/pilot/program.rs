@@ -89,7 +89,8 @@ impl Pilot {
     /// # Panics
     /// When the percept is that of another airplane, or one that [`Percept::check`] refuses.
     pub fn start(&mut self, percept: Percept, tick: u64) {
-        let schedule = ConversationSchedule::from_start_tick(tick, self.world.network.as_ref());
+        let schedule =
+            ConversationSchedule::from_start_tick(tick, self.world.conversation_windows());
         self.start_with_schedule(percept, schedule);
     }
 
@@ -324,7 +325,7 @@ impl Pilot {
                 info,
                 grouping_participant(world, percept, contacts, config),
             )),
-            Protocol::Decision if DecisionStrategy::is_reactive(world) => {
+            Protocol::Decision if DecisionStrategy::needs_intents_alone(world) => {
                 let participant = intent_participant(world, percept, contacts, resolving, config);
                 PilotCyclePhase::Deciding(Conversation::new(info, participant))
             }

@@ -46,8 +46,8 @@ impl TestPilots {
 
     /// Lets the pilots that perceive something decide, over the network of the scenario.
     fn decide(&mut self, run: &AirspaceRun) -> Vec<AirplaneControl> {
-        let network: Option<&Network> = self.world.network.as_ref();
-        let (now, schedule) = (run.cycle(), ConversationSchedule::for_cycle(run.cycle(), network));
+        let now = run.cycle();
+        let schedule = ConversationSchedule::for_cycle(now, self.world.conversation_windows());
         // As they come off a network.
         let percepts: Vec<Percept> = run.percepts().iter().map(over_the_wire).collect();
         let is_due = |pilot: &Pilot| percepts.iter().any(|percept| percept.own.id == pilot.id());

@@ -28,7 +28,7 @@ const CYCLE_LIMIT_FACTOR: f64 = 3.0;
 /// Largest number of steps of a horizon: every action is predicted in all of them.
 const MAX_HORIZON_STEPS: f64 = 10_000.0;
 /// Largest number of steps of a `dt`: each is flown, and its approaches are recorded, by itself.
-const MAX_STEPS_PER_DT: f64 = 1000.0;
+pub(crate) const MAX_STEPS_PER_DT: u64 = 1000;
 /// Largest number of actions of an airplane: the work for a pair grows with its square.
 const MAX_ACTIONS: usize = 1000;
 /// Largest number of pairs of points of two airplanes' actions: a tenth of a second's work.
@@ -278,7 +278,7 @@ impl<'a> Compiler<'a> {
         {
             let cause =
                 "groups that are heard, but one process decides for all (deployment = \"direct\")";
-            let remedy = "set deployment to team, compact-team, pim or hierarchical-pim, or leave \
+            let remedy = "set deployment to team, compact-team, replica-team, pim or hierarchical-pim, or leave \
                           groups out";
             return Err(self.source.error(given.span(), cause, remedy));
         }
@@ -342,7 +342,7 @@ impl<'a> Compiler<'a> {
             let cause = format!("dt_s = {dt_s} is no multiple of dtau_s = {dtau_s}");
             return Err(self.source.error(span, cause, "give a dtau_s that divides dt_s"));
         }
-        if steps > MAX_STEPS_PER_DT {
+        if steps > MAX_STEPS_PER_DT as f64 {
             let cause = format!("{steps} steps of dtau_s in each dt_s");
             let remedy =
                 format!("give up to {MAX_STEPS_PER_DT}: each is flown and watched by itself");

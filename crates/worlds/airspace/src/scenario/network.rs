@@ -130,7 +130,7 @@ impl Compiler<'_> {
             |cause: &str, remedy: &str| Err(self.source.error(section.span(), cause, remedy));
         if self.file.airspace.deployment == Deployment::Direct {
             let cause = "a network, but one process decides for all (deployment = \"direct\")";
-            let remedy = "set deployment to team, compact-team, pim or hierarchical-pim, \
+            let remedy = "set deployment to team, compact-team, replica-team, pim or hierarchical-pim, \
                           or leave [airspace.network] out";
             return error(cause, remedy);
         }

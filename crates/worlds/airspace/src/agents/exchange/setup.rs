@@ -2,8 +2,7 @@
 
 use super::Proposal;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
-use crate::agents::traffic_state::StateBeacon;
-use crate::flight::FlightConditions;
+use crate::flight::{FlightConditions, FlightLevelRange};
 use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
@@ -23,22 +22,14 @@ pub struct ObservedAircraft {
     pub is_on_orbit: bool,
     /// Whether it takes part in the exchange, so that it may be heard.
     pub takes_part: bool,
+    /// Its airspeed by its filed flight, in meters per second.
+    pub filed_v_m_s: f64,
+    /// The levels that it is on and changes to, as it is seen and by its filed flight.
+    pub filed_levels: FlightLevelRange,
     /// Its greatest speed in meters per second.
     pub max_speed_m_s: f64,
     /// Largest number of different profiles that it can propose.
     pub max_profiles: usize,
-}
-
-impl ObservedAircraft {
-    /// Checks a beacon against where this airplane is seen and what it has filed.
-    fn check_beacon(&self, beacon: &StateBeacon) -> Result<(), InvalidMessage> {
-        let ShieldedAircraft { pose, omega_max_rad_s, orbit_rad_s, separation_m, .. } =
-            self.aircraft;
-        let claimed = [beacon.omega_max_rad_s, beacon.orbit_rad_s, beacon.separation_m];
-        let is_filed = claimed == [omega_max_rad_s, orbit_rad_s, separation_m];
-        InvalidMessage::Plan.ensure(is_filed && beacon.pose == pose)?;
-        beacon.check(self.max_speed_m_s)
-    }
 }
 
 /// The situation as all of a group see it, and numbers on which they have agreed, before they exchange
@@ -55,6 +46,8 @@ pub struct ShieldExchangeSetup {
     pub certainty: PlanCertainty,
     /// Number of all airplanes, also of those that are not in the group.
     pub airplanes: usize,
+    /// Largest number of bytes that a proposal should take; none where the radio has no budget.
+    pub max_proposal_bytes: Option<usize>,
     /// All airplanes of the group as they can be seen, by rising id.
     pub aircraft: Vec<ObservedAircraft>,
 }
@@ -81,10 +74,12 @@ impl ShieldExchangeSetup {
         place: usize,
         proposal: &Proposal,
     ) -> Result<(), InvalidMessage> {
-        let Proposal { beacon, orbit_pose, exempt, profiles, .. } = proposal;
-        self.aircraft[place].check_beacon(beacon)?;
-        let is_valid_pose =
-            orbit_pose.heading_rad.abs() < MAX_HEADING_RAD && are_valid_coordinates(orbit_pose.at);
+        let Proposal { orbit_pose, exempt, profiles, .. } = proposal;
+        let observed = &self.aircraft[place];
+        proposal.beacon(observed).check(observed.max_speed_m_s)?;
+        let is_valid_pose = orbit_pose.is_none_or(|pose| {
+            pose.heading_rad.abs() < MAX_HEADING_RAD && are_valid_coordinates(pose.at)
+        });
         InvalidMessage::Number.ensure(is_valid_pose)?;
         let are_known = exempt.iter().all(|&id| (id as usize) < self.airplanes);
         InvalidMessage::Airplane.ensure(are_known && is_ascending(exempt))?;
@@ -117,8 +112,9 @@ impl ShieldExchangeSetup {
     /// Returns the largest number of bytes of a message: a proposal with as many profiles as any airplane can have.
     pub(super) fn max_message_bytes(&self) -> usize {
         let profiles = self.aircraft.iter().map(|one| one.max_profiles).max().unwrap_or(0);
-        // A number of a message takes 8 bytes, a length or an id at most 5; the beacon is well below 256.
-        let profile_bytes = 8 * self.air.timing.points_per_dt() + 5;
+        // A number of a message takes 8 bytes, a length or an id at most 5, and a profile may have another rate in each
+        // step; the rest is well below 256.
+        let profile_bytes = 13 * self.air.timing.points_per_dt() + 5;
         256 + profiles * profile_bytes + 5 * self.airplanes
     }
 }

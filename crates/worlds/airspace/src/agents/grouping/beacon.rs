@@ -1,5 +1,6 @@
 //! Beacons: messages of airplanes about themselves, before they know the others that they decide with.
 
+use crate::agents::intent::Intent;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use crate::flight::{KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
@@ -28,6 +29,12 @@ impl SurveillanceReport {
     pub(crate) fn as_known_aircraft(&self) -> KnownAircraft {
         let &Self { id, pose, altitude_m, .. } = self;
         KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m }
+    }
+
+    /// Returns the knowledge of it once it has sent its intentions.
+    pub(crate) fn with_intent(&self, intent: &Intent) -> KnownAircraft {
+        let &Intent { next, orders, altitude_m, .. } = intent;
+        KnownAircraft { slot: self.id, pose: self.pose, next: next as usize, orders, altitude_m }
     }
 }
 

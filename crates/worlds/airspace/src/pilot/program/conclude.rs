@@ -9,11 +9,11 @@ use crate::agents::traffic_state::{TrafficPicture, record_beacon};
 use crate::agents::{ConversationEnd, OptimizationResult};
 use crate::decide::{
     DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_velocity,
-    candidates_from_choice,
+    candidates_from_choice, decide_by_predictions,
 };
 use crate::events::{Event, EventKind};
 use crate::flight::KnownAircraft;
-use crate::pilot::common_knowledge::unheard_as_non_cooperative;
+use crate::pilot::common_knowledge::{beacon, ownship, unheard_as_non_cooperative};
 use crate::pilot::control::{Maneuver, OptimizationStatus};
 use crate::pilot::conversations::ConversationOutcome;
 
@@ -106,7 +106,12 @@ impl Pilot {
             PilotCyclePhase::Deciding(conversation) => {
                 self.keep_ended(conversation);
                 match ended.outcome {
-                    Some(ConversationOutcome::Intents(intents)) => self.on_intents(&intents),
+                    Some(ConversationOutcome::Intents(intents))
+                        if DecisionStrategy::is_reactive(&self.world) =>
+                    {
+                        self.on_intents(&intents)
+                    }
+                    Some(ConversationOutcome::Intents(intents)) => self.decide_for_all(&intents),
                     Some(ConversationOutcome::Optimization(conclusion)) => {
                         self.on_optimization(Some(conclusion))
                     }
@@ -162,6 +167,30 @@ impl Pilot {
         self.set_candidates(considered);
     }
 
+    /// Optimizes for the whole group by the messages of all, as every member does, and keeps the own part of the decision.
+    fn decide_for_all(&mut self, intents: &[Option<Intent>]) {
+        let Some(state) = &self.state else { return };
+        let world = &*self.world;
+        let now = state.percept.cycle;
+        let own = ownship(world, &state.percept, &state.unheard, &self.memory.contacts);
+        let mut options = Vec::new();
+        for (place, (one, intent)) in state.percept.group.iter().zip(intents).enumerate() {
+            let Some(intent) = intent else {
+                options.push(own.presumed_predictions(place));
+                continue;
+            };
+            let known = one.with_intent(intent);
+            options.push(world.action_predictions(known, &own.common.non_cooperative));
+            if world.network.is_some() && one.id != self.id {
+                record_beacon(&mut self.memory.contacts, one.id, beacon(world, known), now);
+            }
+        }
+        let mut decided = decide_by_predictions(world, &own.common.ids, &options, now);
+        let beacons = Vec::new();
+        let decided = Some(decided.swap_remove(own.me));
+        self.on_optimization(Some(OptimizationResult { decided, beacons }));
+    }
+
     /// Finds the headings of all from their messages; one without a message is assumed to fly straight on.
     fn on_intents(&mut self, intents: &[Option<Intent>]) {
         let Some(state) = &self.state else { return };
@@ -179,9 +208,7 @@ impl Pilot {
             if one.id == self.id {
                 me = group.len();
             }
-            let &Intent { next, orders, altitude_m, .. } = intent;
-            let next = next as usize;
-            group.push(KnownAircraft { slot: one.id, pose: one.pose, next, orders, altitude_m });
+            group.push(one.with_intent(intent));
             memory.push(intent.resolving.clone());
         }
         let now = state.percept.cycle;
