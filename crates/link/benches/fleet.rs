@@ -35,14 +35,18 @@ fn main() {
         conflict(10);
     }
     if is_wanted("cost") {
-        cost(10);
+        for topology in [Topology::Mesh, Topology::Multicast] {
+            cost(10, topology);
+        }
     }
     if is_wanted("recovery") {
         recovery(6, 24);
     }
     if is_wanted("nodes") {
         let seconds = std::env::var("SIDESTEP_BENCH_S").ok().and_then(|text| text.parse().ok());
-        nodes(50, Duration::from_secs(seconds.unwrap_or(60)));
+        for topology in [Topology::Mesh, Topology::Multicast] {
+            nodes(50, Duration::from_secs(seconds.unwrap_or(60)), topology);
+        }
     }
 }
 
@@ -166,6 +170,7 @@ fn job(folder: &Path, clock: ClockMode) -> FleetJob {
         nodes: None,
         clock,
         topology: Topology::Mesh,
+        multicast_group: None,
         listen: vec!["tcp/127.0.0.1:0".into()],
         out: None,
         replace: false,
@@ -242,16 +247,16 @@ struct Cost {
 
 /// Prints the processor time of a whole super-conflict, as processes beside one process: of all processes together, with
 /// and without their start.
-fn cost(n: u32) {
+fn cost(n: u32, topology: Topology) {
     let mut ratios = Vec::new();
     for _ in 0..3 {
         let (alone, alone_digest) = cost_of_one_process(n);
-        let (start, _) = cost_of_fleet(n, 1);
-        let (fleet, digest) = cost_of_fleet(n, 1000);
+        let (start, _) = cost_of_fleet(n, 1, topology);
+        let (fleet, digest) = cost_of_fleet(n, 1000, topology);
         assert_eq!(digest, alone_digest, "the digest of one process");
         println!(
-            "processor time of a super-conflict of {n}: one process {:.2} s, {n} processes {:.2} s, {:.2} s of it for the \
-             start and one cycle",
+            "processor time of a super-conflict of {n}, {topology:?}: one process {:.2} s, {n} processes {:.2} s, {:.2} s of it \
+             for the start and one cycle",
             alone.cpu_s, fleet.cpu_s, start.cpu_s
         );
         let without_start = (fleet.cpu_s - start.cpu_s) / alone.cpu_s;
@@ -285,12 +290,13 @@ fn cost_of_one_process(n: u32) -> (Cost, String) {
 
 /// Returns what a super-conflict costs as a fleet, from the start of its processes to the end of the last one, and its
 /// digest.
-fn cost_of_fleet(n: u32, cycles: u64) -> (Cost, String) {
+fn cost_of_fleet(n: u32, cycles: u64, topology: Topology) -> (Cost, String) {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("s.toml"), text(n, cycles)).expect("written");
     let began = Instant::now();
     let cpu_s = cpu_seconds();
-    let (digest, _) = fly(job(folder.path(), ClockMode::Lockstep), |_| true);
+    let job = FleetJob { topology, ..job(folder.path(), ClockMode::Lockstep) };
+    let (digest, _) = fly(job, |_| true);
     let wall_s = began.elapsed().as_secs_f64();
     (Cost { cpu_s: cpu_seconds() - cpu_s, wall_s }, digest)
 }
@@ -437,14 +443,15 @@ impl Drop for Killer {
 }
 
 /// Prints the cost of many nodes in real time: deadlines missed, memory, bytes.
-fn nodes(n: u32, flown_for: Duration) {
+fn nodes(n: u32, flown_for: Duration, topology: Topology) {
     let folder = tempfile::tempdir().expect("a folder");
     // As wide as the distance that they fly in that time, so that they meet in the middle of it.
     let radius_m = 8_000.0 + 35.0 * flown_for.as_secs_f64() / 2.0;
     let text = format!("{}radius_m = {radius_m:?}\n", text(n, 1_000_000));
     std::fs::write(folder.path().join("s.toml"), text).expect("written");
     let (mut first, mut memory_kb) = (None, [0, 0]);
-    let (_, fleet) = fly(job(folder.path(), ClockMode::Realtime { speed: 1.0 }), |now| {
+    let job = FleetJob { topology, ..job(folder.path(), ClockMode::Realtime { speed: 1.0 }) };
+    let (_, fleet) = fly(job, |now| {
         if now.has_begun {
             let since = *first.get_or_insert(Instant::now());
             let nodes = now.nodes.iter();
@@ -458,7 +465,7 @@ fn nodes(n: u32, flown_for: Duration) {
     let late: u64 = fleet.nodes.iter().map(|node| node.late).sum();
     let bytes: u64 = fleet.nodes.iter().map(|node| node.bytes).sum();
     println!(
-        "{n} nodes for {flown_s} s, {} cycles: {late} controls late, {} cycles of the server late; \
+        "{n} nodes, {topology:?}, for {flown_s} s, {} cycles: {late} controls late, {} cycles of the server late; \
          {:.0} bytes a node and second; memory of a node at most {:.1} MB resident, {:.1} MB as its share",
         fleet.cycle,
         fleet.late_cycles,

@@ -10,9 +10,10 @@ use serde::{Deserialize, Serialize};
 use sidestep::kernel::digest::Digest;
 use sidestep::kernel::{Cycle, EntityId};
 pub use sidestep_session::fleet::{ClockMode, Topology};
+use std::net::SocketAddrV4;
 
 /// First bytes of every frame: `Sk`, and the version of the format.
-const MAGIC: [u8; 3] = [b'S', b'k', 5];
+const MAGIC: [u8; 3] = [b'S', b'k', 6];
 
 /// Bytes of the digest at the end of a frame: of 10^9 damaged ones, all are noticed but for a chance of 1 in 10^10.
 const DIGEST_BYTES: usize = 8;
@@ -124,6 +125,8 @@ pub struct Welcome {
     pub clock: ClockMode,
     /// The path of packets from node to node.
     pub topology: Topology,
+    /// The group of all nodes, with multicast.
+    pub multicast_group: Option<SocketAddrV4>,
     /// Changes of the scenario beyond those that the node was given, as `key=value`.
     pub overrides: Vec<String>,
     /// Whether all packets are recorded.

@@ -10,6 +10,7 @@ use sidestep_kernel::view::{Frame, Scenery};
 use sidestep_kernel::{Cycle, EntityId, InputError};
 use std::borrow::Cow;
 use std::fmt;
+use std::net::SocketAddrV4;
 use std::path::PathBuf;
 
 /// The program beside `sidestep` that alone contains the network stack.
@@ -100,6 +101,8 @@ pub struct FleetJob {
     pub clock: ClockMode,
     /// The way from node to node.
     pub topology: Topology,
+    /// The multicast group of the nodes, where they have one; one that no other fleet of this machine uses unless given.
+    pub multicast_group: Option<SocketAddrV4>,
     /// Endpoints at which the server listens, e.g. `tcp/127.0.0.1:0`.
     pub listen: Vec<String>,
     /// Folder in which the run is recorded.
@@ -159,6 +162,8 @@ pub enum Topology {
     Mesh,
     /// Through the server.
     Star,
+    /// By UDP multicast: a packet to many is sent once.
+    Multicast,
 }
 
 /// Certificates with which both ends of a link prove their identity; files in the format PEM.

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::text::{KeyValues, key_value_pair};
 use sidestep_session::fleet::{ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology};
+use std::net::SocketAddrV4;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -48,6 +49,8 @@ enum TopologyArg {
     Mesh,
     /// All packets go through the server
     Star,
+    /// By UDP multicast: a packet to many is sent once
+    Multicast,
 }
 
 /// Run a scenario with a process for each airplane, or for each connector of a chain.
@@ -73,6 +76,11 @@ pub(crate) struct FleetArgs {
     /// Network topology: the route of packets from node to node
     #[arg(long, value_enum, default_value_t = TopologyArg::Mesh)]
     topology: TopologyArg,
+
+    /// Multicast group of the nodes, e.g. 239.255.7.1:7601
+    /// [default: one that no other fleet has]
+    #[arg(long, value_name = "ADDRESS:PORT", value_parser = parse_group)]
+    multicast_group: Option<SocketAddrV4>,
 
     /// Endpoint on which the server listens, e.g. tcp/10.0.0.1:7600; repeatable
     /// [default: any free port of this machine alone]
@@ -102,6 +110,17 @@ pub(crate) struct FleetArgs {
 fn parse_speed(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x| (0.01..=1000.0).contains(x));
     number.ok_or_else(|| "give a number from 0.01 to 1000".into())
+}
+
+fn parse_group(text: &str) -> Result<SocketAddrV4, String> {
+    let group = text
+        .parse()
+        .ok()
+        .filter(|group: &SocketAddrV4| group.ip().is_multicast() && group.port() > 0);
+    group.ok_or_else(|| {
+        "give an address from 224.0.0.0 to 239.255.255.255 and a port, as in 239.255.7.1:7601"
+            .into()
+    })
 }
 
 /// # Errors
@@ -150,7 +169,9 @@ impl FleetArgs {
             topology: match self.topology {
                 TopologyArg::Mesh => Topology::Mesh,
                 TopologyArg::Star => Topology::Star,
+                TopologyArg::Multicast => Topology::Multicast,
             },
+            multicast_group: self.multicast_group,
             listen: if self.listen.is_empty() { vec![loopback] } else { self.listen.clone() },
             out: self.out.clone(),
             replace: self.replace,
@@ -218,13 +239,17 @@ impl FleetArgs {
 
     fn network_lines(&self, fleet: &FleetStatus) -> KeyValues {
         let nodes = &fleet.nodes;
-        let topology = if self.topology == TopologyArg::Mesh { "mesh" } else { "star" };
+        let topology = match self.topology {
+            TopologyArg::Mesh => "in a mesh",
+            TopologyArg::Star => "in a star",
+            TopologyArg::Multicast => "by multicast",
+        };
         let clock = if self.clock == ClockArg::Lockstep { "lockstep" } else { "real time" };
         let restarted: u64 = nodes.iter().map(|node| node.lives.saturating_sub(1)).sum();
         let packets = nodes.iter().map(|node| node.packets).sum();
         let bytes = nodes.iter().map(|node| node.bytes).sum();
         let mut lines = vec![
-            key_value_pair("nodes", format!("{} in a {topology}, {clock}", nodes.len())),
+            key_value_pair("nodes", format!("{} {topology}, {clock}", nodes.len())),
             key_value_pair(
                 "packets",
                 format!("{} sent, {} bytes", group_thousands(packets), group_thousands(bytes)),

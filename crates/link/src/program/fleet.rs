@@ -19,10 +19,10 @@ use crate::server::histogram::Histogram;
 use crate::server::{
     FleetContext, FleetError, FleetServer, NodeEntry, SILENCE_TIMEOUT, ServerConfig, ServerHooks,
 };
-use crate::wire::PeerId;
 use crate::wire::endpoint::{PortReservation, WireSetupError, reserve_port, with_port};
 use crate::wire::view_server::ViewServer;
 use crate::wire::zenoh::ZenohWire;
+use crate::wire::{PeerId, draw_group};
 use sidestep::kernel::ports::RecordError;
 use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::view::Frame;
@@ -34,6 +34,7 @@ use sidestep_session::fleet::{
 };
 use sidestep_session::{Error, ManagedRun, OutputPaths, Watcher};
 use std::collections::BTreeMap;
+use std::net::SocketAddrV4;
 use std::time::{Duration, Instant};
 
 /// Time between two reports to the parent process: nodes report as often.
@@ -77,6 +78,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
         welcome: Welcome {
             clock: job.clock,
             topology: job.topology,
+            multicast_group: multicast_group(job),
             overrides,
             logs_packets: job.packets,
         },
@@ -98,6 +100,14 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let finished = finish(run.into_managed_run(), result, status, job.clock);
     views.wait_for_viewers();
     finished
+}
+
+/// Returns the group of all nodes, where they have one.
+fn multicast_group(job: &FleetJob) -> Option<SocketAddrV4> {
+    match job.topology {
+        Topology::Mesh | Topology::Star => None,
+        Topology::Multicast => Some(job.multicast_group.unwrap_or_else(draw_group)),
+    }
 }
 
 /// Returns the unchanging part of a run, for viewers.
@@ -148,7 +158,7 @@ fn node_jobs(
     let listen = match job.topology {
         // The server's own address will do: these nodes are on its machine.
         Topology::Mesh => vec![with_port(&connect[0], 0)],
-        Topology::Star => Vec::new(),
+        Topology::Star | Topology::Multicast => Vec::new(),
     };
     let count = job.nodes.unwrap_or(usize::MAX).min(world.agent_count());
     let mut jobs = BTreeMap::new();

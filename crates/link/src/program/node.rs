@@ -62,6 +62,10 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
         .map_err(|e| node_error(e, job))?;
     monitor.record_seat();
     let mut seat = Seat::new(messenger);
+    if let Some(group) = welcome.multicast_group {
+        let joined = seat.join_multicast(group).map_err(endpoint_error);
+        joined.inspect_err(|error| seat.leave(&error.to_string()))?;
+    }
     let scenario = scenario.with_overrides(&welcome.overrides).inspect_err(|error| {
         seat.leave(&error.to_string());
     })?;

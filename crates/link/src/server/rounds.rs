@@ -157,6 +157,7 @@ mod tests {
             welcome: Welcome {
                 clock: ClockMode::Lockstep,
                 topology: Topology::Star,
+                multicast_group: None,
                 overrides: Vec::new(),
                 logs_packets: false,
             },

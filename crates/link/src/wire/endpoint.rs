@@ -147,10 +147,10 @@ pub struct PortReservation {
 
 /// Lowest port that is tried where any will do. The ports are below those that systems give to outgoing connections (from
 /// 32,768 on for Linux), one of which could get the port between its reservation and its use.
-const FIRST_PORT: u16 = 20_000;
+pub(super) const FIRST_PORT: u16 = 20_000;
 
 /// Number of ports that are tried.
-const PORT_COUNT: u16 = 12_000;
+pub(super) const PORT_COUNT: u16 = 12_000;
 
 /// Reserves the port of an endpoint; port 0 stands for any free one.
 ///

@@ -4,6 +4,7 @@
 //!
 //! ```text
 //! zenoh.rs        between processes, with zenoh/echo.rs: probes of half-open links
+//! multicast.rs    between nodes by UDP multicast
 //! memory.rs       between threads
 //! access.rs       who may publish and subscribe what, by certificates
 //! endpoint.rs     notation of endpoints, and reserved ports
@@ -17,13 +18,16 @@ pub mod endpoint;
 mod handshake;
 pub mod http_text;
 pub mod memory;
+mod multicast;
 pub mod view_server;
 pub mod zenoh;
 
 pub use crate::peer::PeerId;
 use crate::protocol::FleetMember;
 pub use endpoint::WireSetupError;
+pub use multicast::draw_group;
 use sidestep::kernel::EntityId;
+use std::net::SocketAddrV4;
 use std::time::Duration;
 
 /// A carrier of frames between peers. A frame may be lost without notice.
@@ -37,6 +41,14 @@ pub trait Wire: Send {
     /// Takes the number of frames that were not received because their sender is not who they say.
     fn take_forged(&mut self) -> u64 {
         0
+    }
+
+    /// Makes frames to other nodes go by a multicast group from now on.
+    ///
+    /// # Errors
+    /// When this machine cannot take part in it.
+    fn join_multicast(&mut self, _group: SocketAddrV4) -> Result<(), WireSetupError> {
+        Ok(())
     }
 
     /// Learns of all nodes of the fleet, and opens the direct links from this one to the others, where there are any.
@@ -78,6 +90,10 @@ impl<W: Wire + ?Sized> Wire for Box<W> {
 
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {
         (**self).receive(within)
+    }
+
+    fn join_multicast(&mut self, group: SocketAddrV4) -> Result<(), WireSetupError> {
+        (**self).join_multicast(group)
     }
 
     fn connect_mesh(

@@ -1,8 +1,9 @@
 //! The wire between processes and machines: Zenoh sessions on explicitly named endpoints, with scouting off.
 //!
 //! A node has a session as a *client* of the server's, which relays (as a *router*, because Zenoh's *peers* do not
-//! relay). In a mesh it has another one as a *peer*, connected to every other node: packets go directly there. A frame
-//! that cannot be sent soon is dropped rather than waited for, so that a stopped peer does not stop others.
+//! relay). In a mesh it has another one as a *peer*, connected to every other node: packets go directly there. With
+//! multicast they go by a socket of its own (`multicast.rs`). A frame that cannot be sent soon is dropped rather than
+//! waited for, so that a stopped peer does not stop others.
 
 mod echo;
 
@@ -11,6 +12,7 @@ use super::endpoint::{
     PortReservation, WireSetupError, check_vacant, connection_problem, endpoint_in_use,
     host_and_port, without_sources,
 };
+use super::multicast::{MAX_DATAGRAM_BYTES, MulticastSocket, SharedWaker};
 use super::{PeerId, Wire, handshake};
 use crate::protocol::{FleetMember, TransportFrame};
 use echo::EchoProbes;
@@ -18,11 +20,12 @@ use sidestep::kernel::EntityId;
 use sidestep_session::fleet::Tls;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::net::SocketAddrV4;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Once};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
@@ -161,6 +164,10 @@ pub struct ZenohWire {
     hub: ZenohLink,
     /// The session with all other nodes, in a mesh.
     mesh: Option<ZenohLink>,
+    /// The group of all nodes, with multicast.
+    multicast: Option<MulticastSocket>,
+    /// Endpoints at one of which the server listens; none of the server's own wire.
+    server: Vec<String>,
     /// The endpoints at which other nodes reach this one; none in a star.
     listens: Vec<String>,
     /// The ports of these endpoints, until the mesh is opened.
@@ -205,6 +212,8 @@ impl fmt::Debug for ZenohWire {
 /// What the subscribers of a wire share.
 struct Inbox {
     frames: Sender<Vec<u8>>,
+    /// Wakes the receiver where it does not wait for these frames alone.
+    waker: SharedWaker,
     /// Number of frames that were not received because their sender is not who they say.
     forged: Arc<AtomicU64>,
 }
@@ -219,6 +228,7 @@ fn subscribe(
     echoes: &EchoProbes,
 ) -> Result<Subscriber<()>, String> {
     let frames = inbox.frames.clone();
+    let waker = inbox.waker.clone();
     let forged = inbox.forged.clone();
     let is_echo = match me {
         PeerId::Node(agent) => Some(echoes.handler(agent, session.clone())),
@@ -236,6 +246,9 @@ fn subscribe(
         }
         // An error means that the wire was dropped.
         let _ = frames.send(bytes);
+        if let Some(waker) = waker.get() {
+            let _ = waker.wake();
+        }
     });
     subscriber.wait().map_err(|e| without_sources(&e.to_string()))
 }
@@ -329,16 +342,17 @@ impl ZenohWire {
             PeerId::Server => Guarded::Server,
         };
         let config = client_config(connect, credentials.map(|own| (own, guarded)), within);
-        Self::from_config(me, &config).map_err(|reason| {
+        let wire = Self::from_config(me, &config).map_err(|reason| {
             // At the first check the other end may not have listened yet.
             check_trust(connect, tls).err().unwrap_or_else(|| no_answer(connect, reason))
-        })
+        })?;
+        Ok(Self { server: connect.to_vec(), ..wire })
     }
 
     fn from_config(me: PeerId, config: &ZenohConfig<'_>) -> Result<Self, String> {
         let (frame_sender, frames) = channel();
         let echoes = EchoProbes::default();
-        let inbox = Inbox { frames: frame_sender, forged: Arc::default() };
+        let inbox = Inbox { frames: frame_sender, waker: Arc::default(), forged: Arc::default() };
         let hub = ZenohLink::new(config.open()?, me, &inbox, &echoes)?;
         Ok(Self {
             me,
@@ -346,6 +360,8 @@ impl ZenohWire {
             inbox,
             hub,
             mesh: None,
+            multicast: None,
+            server: Vec::new(),
             listens: Vec::new(),
             ports: Vec::new(),
             credentials: config.guard.map(|(own, _)| own.clone()),
@@ -452,6 +468,14 @@ fn no_answer(connect: &[String], said: String) -> WireSetupError {
 
 impl Wire for ZenohWire {
     fn send(&mut self, to: &[PeerId], frame: &[u8]) {
+        if let Some(group) = &self.multicast
+            && !to.contains(&PeerId::Server)
+            // The server relays what is too large for a datagram.
+            && frame.len() <= MAX_DATAGRAM_BYTES
+        {
+            group.send(frame);
+            return;
+        }
         let link = match &mut self.mesh {
             Some(mesh) if !to.contains(&PeerId::Server) => mesh,
             _ => &mut self.hub,
@@ -475,7 +499,34 @@ impl Wire for ZenohWire {
     }
 
     fn receive(&mut self, within: Duration) -> Option<Vec<u8>> {
-        self.frames.recv_timeout(within).ok()
+        let Some(group) = &mut self.multicast else {
+            return self.frames.recv_timeout(within).ok();
+        };
+        let until = Instant::now() + within;
+        loop {
+            // What the server says comes first: it may make what others say obsolete.
+            if let Ok(frame) = self.frames.try_recv() {
+                return Some(frame);
+            }
+            while let Some(frame) = group.try_receive() {
+                // Only a node sends to the group. Whoever names the server there would be believed: what that says is
+                // not signed, because it comes over a link with it.
+                if TransportFrame::sender(&frame) != Some(PeerId::Server) {
+                    return Some(frame);
+                }
+                self.inbox.forged.fetch_add(1, Ordering::Relaxed);
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return None;
+            }
+            group.wait(left);
+        }
+    }
+
+    fn join_multicast(&mut self, group: SocketAddrV4) -> Result<(), WireSetupError> {
+        self.multicast = Some(MulticastSocket::join(group, &self.server, &self.inbox.waker)?);
+        Ok(())
     }
 
     fn connect_mesh(

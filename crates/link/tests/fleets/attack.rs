@@ -30,7 +30,7 @@ fn session(connect: &[String], tls: &Tls) -> Session {
 }
 
 /// A frame of the server to airplane 0 that ends its node, if it is believed.
-fn dismissal() -> Vec<u8> {
+pub(crate) fn dismissal() -> Vec<u8> {
     let header =
         RecipientHeader { peer: PeerId::Node(0), incarnation: None, ack: 0, sequence: None };
     let error = JoinError { cause: "forged".into(), remedy: "none".into() };

@@ -123,7 +123,7 @@ impl RoutedMachines {
         let connect = fleet.listen.clone();
         let listen = match fleet.topology {
             Topology::Mesh => vec![format!("tcp/{}:0", ADDRESSES[1])],
-            Topology::Star => Vec::new(),
+            Topology::Star | Topology::Multicast => Vec::new(),
         };
         let server = LinkProcess::start_in(&self.names[0], &Job::Fleet(fleet));
         let listens = |message| matches!(message, LinkMessage::Listens(_)).then_some(());

@@ -8,6 +8,7 @@ mod cuts;
 mod faults;
 mod flights;
 mod input;
+mod multicast;
 mod namespaces;
 mod output;
 mod processes;

@@ -101,15 +101,17 @@ fn start(machines: &Machines, mut fleet: FleetJob) -> (LinkProcess, Vec<LinkProc
 
 #[test]
 fn two_machines_come_out_as_one_process_does() {
-    let Some(machines) = Machines::new() else { return };
     let text = superconflict(4, "compact-team", 15, "");
     let folder = folder(&text);
-    let (server, nodes) = start(&machines, job(folder.path(), Topology::Mesh, ClockMode::Lockstep));
-    let (summary, _) = server.complete();
-    assert_eq!(summary["digest"], run_in_one_process(&text).digest);
-    assert_eq!(server.end(), (Some(0), None));
-    for node in nodes {
-        assert_eq!(node.end(), (Some(0), None));
+    for topology in [Topology::Mesh, Topology::Multicast] {
+        let Some(machines) = Machines::new() else { return };
+        let (server, nodes) = start(&machines, job(folder.path(), topology, ClockMode::Lockstep));
+        let (summary, _) = server.complete();
+        assert_eq!(summary["digest"], run_in_one_process(&text).digest, "{topology:?}");
+        assert_eq!(server.end(), (Some(0), None));
+        for node in nodes {
+            assert_eq!(node.end(), (Some(0), None));
+        }
     }
 }
 

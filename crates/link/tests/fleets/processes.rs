@@ -42,6 +42,7 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJ
         nodes: None,
         clock,
         topology,
+        multicast_group: None,
         listen: vec!["tcp/127.0.0.1:0".into()],
         out: None,
         replace: false,

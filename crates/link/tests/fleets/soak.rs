@@ -56,7 +56,7 @@ impl FaultPlan {
         let streams = Streams::new(Seed(seed));
         let draw = |k: u64, purpose| streams.block(0, k, Purpose(purpose), 0);
         let [deployment, topology, ..] = draw(0, 1);
-        let deployments = ["pim", "compact-team", "hierarchical-pim", "team"];
+        let deployments = ["pim", "compact-team", "hierarchical-pim", "team", "replica-team"];
         let mut faults = Vec::new();
         let mut at = Duration::from_secs(5);
         for k in 0.. {
@@ -79,7 +79,7 @@ impl FaultPlan {
         Self {
             seed,
             deployment: deployments[deployment as usize % deployments.len()],
-            topology: if topology % 2 == 0 { Topology::Mesh } else { Topology::Star },
+            topology: [Topology::Mesh, Topology::Star, Topology::Multicast][topology as usize % 3],
             faults,
             network: network(seconds, |k| draw(k, 3)),
         }
@@ -254,7 +254,8 @@ fn a_fleet_whose_nodes_are_killed_stopped_and_parted_flies_on_and_stays_apart() 
     let folder = folder(&plan.scenario(lasts));
     let mut job = job(folder.path(), plan.topology, ClockMode::Realtime { speed: SPEED });
     job.common.lease_s = 3.0;
-    let machines = RoutedMachines::new();
+    // The router between the machines passes on no multicast.
+    let machines = if plan.topology == Topology::Multicast { None } else { RoutedMachines::new() };
     let (mut program, mut far) = match &machines {
         Some(machines) => machines.start(job, NEAR, AIRPLANES - NEAR),
         None => (LinkProcess::start(&Job::Fleet(job)), Vec::new()),

@@ -179,6 +179,7 @@ pub(crate) fn run_in_threads(
     let welcome = Welcome {
         clock: setup.clock,
         topology: setup.topology,
+        multicast_group: None,
         overrides: Vec::new(),
         logs_packets: false,
     };

@@ -91,6 +91,7 @@ fn fleet_job(file: &Path) -> FleetJob {
         nodes: None,
         clock: ClockMode::Lockstep,
         topology: Topology::Mesh,
+        multicast_group: None,
         listen: vec!["tcp/127.0.0.1:0".into()],
         out: None,
         replace: false,

@@ -33,7 +33,7 @@ fn link(
         .open()
         .expect("open");
     let (sender, frames) = channel();
-    let inbox = Inbox { frames: sender, forged: Arc::default() };
+    let inbox = Inbox { frames: sender, waker: Arc::default(), forged: Arc::default() };
     (ZenohLink::new(session, me, &inbox, &EchoProbes::default()).expect("a link"), frames)
 }
 

@@ -1,0 +1,230 @@
+//! A multicast group of UDP: a frame to many nodes is sent once, and the network copies it.
+//!
+//! A datagram arrives whole or not at all, and a lost one stops no other: what must arrive is repeated above
+//! (`arq.rs`). There are no links that could break, and nothing here waits for another node.
+
+use super::endpoint::{WireSetupError, bare_host, endpoint_in_use, host_and_port};
+use mio::net::UdpSocket;
+use mio::{Events, Interest, Poll, Token, Waker};
+use socket2::{Domain, Protocol, Socket, Type};
+use std::collections::hash_map::RandomState;
+use std::hash::BuildHasher;
+use std::io;
+use std::net::{
+    IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, ToSocketAddrs, UdpSocket as StdUdpSocket,
+};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+/// Maximum size of a datagram's content: what a length of 16 bits leaves beside the headers of IPv4 and UDP.
+pub(super) const MAX_DATAGRAM_BYTES: usize = 65_507;
+
+/// Bytes that wait in the socket until the node reads them; the system may give less. A round of fifty nodes fits in,
+/// with the bookkeeping of the system for each datagram.
+const RECEIVE_BUFFER_BYTES: usize = 1 << 20;
+
+/// Maximum number of routers between two nodes, which have to be told to forward multicast at all.
+const TIME_TO_LIVE: u32 = 8;
+
+const SOCKET: Token = Token(0);
+const WAKER: Token = Token(1);
+
+/// Wakes a node that waits for datagrams when something else has arrived; none before it has a multicast group.
+pub(super) type SharedWaker = Arc<OnceLock<Waker>>;
+
+/// A membership in a group.
+pub(super) struct MulticastSocket {
+    group: SocketAddrV4,
+    poll: Poll,
+    events: Events,
+    receiver: UdpSocket,
+    sender: UdpSocket,
+    /// The address from which this node sends: its own datagrams come back to it, too.
+    own_address: SocketAddr,
+    buffer: Box<[u8]>,
+}
+
+impl MulticastSocket {
+    /// Joins a group at the interface by which this machine reaches one of some endpoints; `waker` is set.
+    ///
+    /// # Errors
+    /// When this machine has no such interface, or it carries no multicast.
+    pub(super) fn join(
+        group: SocketAddrV4,
+        toward: &[String],
+        waker: &SharedWaker,
+    ) -> Result<Self, WireSetupError> {
+        let taken =
+            |error: io::Error| endpoint_in_use(&[format!("udp/{group}")], error.to_string());
+        let interface = interface_toward(toward)?;
+        let poll = Poll::new().map_err(taken)?;
+        let mut receiver = open_receiver(group, interface).map_err(taken)?;
+        let sender = open_sender(interface).map_err(taken)?;
+        poll.registry().register(&mut receiver, SOCKET, Interest::READABLE).map_err(taken)?;
+        let own_address = sender.local_addr().map_err(taken)?;
+        let _ = waker.set(Waker::new(poll.registry(), WAKER).map_err(taken)?);
+        let events = Events::with_capacity(4);
+        let buffer = vec![0; MAX_DATAGRAM_BYTES].into();
+        Ok(Self { group, poll, events, receiver, sender, own_address, buffer })
+    }
+
+    /// Sends a frame to all nodes of the group. One that the system does not take is lost, as in transit.
+    pub(super) fn send(&self, frame: &[u8]) {
+        let _ = self.sender.send_to(frame, self.group.into());
+    }
+
+    /// Returns the next frame that has arrived from another node, if any.
+    pub(super) fn try_receive(&mut self) -> Option<Vec<u8>> {
+        loop {
+            match self.receiver.recv_from(&mut self.buffer) {
+                Ok((_, from)) if from == self.own_address => {}
+                Ok((length, _)) => return Some(self.buffer[..length].to_vec()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                // None is there, or the system reports that one of ours could not be delivered.
+                Err(_) => return None,
+            }
+        }
+    }
+
+    /// Waits until something arrives here, or its waker is used, and at most the given time.
+    pub(super) fn wait(&mut self, within: Duration) {
+        // An interrupt is like an arrival: the caller looks what there is.
+        let _ = self.poll.poll(&mut self.events, Some(within));
+    }
+}
+
+fn open_receiver(group: SocketAddrV4, interface: Ipv4Addr) -> io::Result<UdpSocket> {
+    let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
+    // Every node of a machine receives at the same port.
+    socket.set_reuse_address(true)?;
+    // A system that gives less gives what it has.
+    let _ = socket.set_recv_buffer_size(RECEIVE_BUFFER_BYTES);
+    // Bound to the group, it gets nothing that is sent to another one at the same port; Windows cannot bind it so.
+    let bound = if cfg!(windows) { Ipv4Addr::UNSPECIFIED } else { *group.ip() };
+    socket.bind(&SocketAddrV4::new(bound, group.port()).into())?;
+    socket.join_multicast_v4(group.ip(), &interface)?;
+    socket.set_nonblocking(true)?;
+    Ok(UdpSocket::from_std(socket.into()))
+}
+
+fn open_sender(interface: Ipv4Addr) -> io::Result<UdpSocket> {
+    let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
+    socket.set_multicast_if_v4(&interface)?;
+    socket.set_multicast_ttl_v4(TIME_TO_LIVE)?;
+    // Nodes on the same machine hear it, too.
+    socket.set_multicast_loop_v4(true)?;
+    socket.bind(&SocketAddrV4::new(interface, 0).into())?;
+    socket.set_nonblocking(true)?;
+    Ok(UdpSocket::from_std(socket.into()))
+}
+
+/// Returns the address of this machine from which it reaches one of some endpoints.
+fn interface_toward(endpoints: &[String]) -> Result<Ipv4Addr, WireSetupError> {
+    for endpoint in endpoints {
+        let (host, port) = host_and_port(endpoint)?;
+        let Ok(addresses) = (bare_host(host), port).to_socket_addrs() else { continue };
+        for address in addresses.filter(SocketAddr::is_ipv4) {
+            if let Some(interface) = interface_toward_address(address) {
+                return Ok(interface);
+            }
+        }
+    }
+    let reason = "multicast needs an IPv4 address of the server, from which follows the interface"
+        .to_string();
+    Err(WireSetupError::NoEndpoint { endpoint: endpoints.join(", "), reason })
+}
+
+fn interface_toward_address(address: SocketAddr) -> Option<Ipv4Addr> {
+    let socket = StdUdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
+    // Nothing is sent: the system looks up the route.
+    socket.connect(address).ok()?;
+    match socket.local_addr().ok()?.ip() {
+        IpAddr::V4(interface) => Some(interface),
+        IpAddr::V6(_) => None,
+    }
+}
+
+/// Returns a group that no other fleet has, but for a chance of 1 in 786 million: its address is of those that stay within
+/// an organization's network (RFC 2365), its port one of those that fleets take (`reserve_port`).
+pub fn draw_group() -> SocketAddrV4 {
+    // The standard library seeds its hash maps from the system's source of randomness.
+    let [a, b, c, d, ..] = RandomState::new().hash_one("multicast group").to_le_bytes();
+    let port =
+        super::endpoint::FIRST_PORT + u16::from_le_bytes([c, d]) % super::endpoint::PORT_COUNT;
+    SocketAddrV4::new(Ipv4Addr::new(239, 255, a, b), port)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Instant;
+
+    const LOOPBACK: &str = "tcp/127.0.0.1:7600";
+
+    /// Returns a member of a group on this machine; `None`, with a printed reason, where that has no multicast.
+    fn member(group: SocketAddrV4, waker: &SharedWaker) -> Option<MulticastSocket> {
+        let joined = MulticastSocket::join(group, &[LOOPBACK.into()], waker);
+        joined.map_err(|error| sidestep_testing::skip(&error.to_string())).ok()
+    }
+
+    fn receive(socket: &mut MulticastSocket) -> Option<Vec<u8>> {
+        let until = Instant::now() + Duration::from_secs(20);
+        loop {
+            let frame = socket.try_receive();
+            let left = until.saturating_duration_since(Instant::now());
+            if frame.is_some() || left.is_zero() {
+                return frame;
+            }
+            socket.wait(left);
+        }
+    }
+
+    #[test]
+    fn a_frame_reaches_all_others_of_its_group_and_not_its_sender() {
+        let group = draw_group();
+        let join = || member(group, &SharedWaker::default());
+        let (Some(mut a), Some(mut b), Some(mut c)) = (join(), join(), join()) else { return };
+        let large = vec![7; MAX_DATAGRAM_BYTES];
+        a.send(&large);
+        b.send(&[8]);
+        assert!(receive(&mut b) == Some(large.clone()), "of the greatest size");
+        assert!(receive(&mut c) == Some(large));
+        assert_eq!(receive(&mut c), Some(vec![8]));
+        assert_eq!(receive(&mut a), Some(vec![8]), "its own frame does not come back");
+    }
+
+    #[test]
+    fn a_frame_of_another_group_at_the_same_port_is_not_heard() {
+        let group = draw_group();
+        let other = SocketAddrV4::new(Ipv4Addr::new(239, 254, 0, 1), group.port());
+        let join = |group| member(group, &SharedWaker::default());
+        let (Some(mut a), Some(b), Some(stranger)) = (join(group), join(group), join(other)) else {
+            return;
+        };
+        stranger.send(&[1]);
+        b.send(&[2]);
+        assert_eq!(receive(&mut a), Some(vec![2]));
+    }
+
+    #[test]
+    fn a_waker_ends_a_wait_for_datagrams() {
+        let waker = SharedWaker::default();
+        let Some(mut socket) = member(draw_group(), &waker) else { return };
+        let began = Instant::now();
+        waker.get().expect("it is set").wake().expect("awake");
+        socket.wait(Duration::from_secs(20));
+        assert!(began.elapsed() < Duration::from_secs(10));
+        assert_eq!(socket.try_receive(), None);
+    }
+
+    #[test]
+    fn a_server_that_has_no_ipv4_address_is_refused_with_the_reason() {
+        let error = MulticastSocket::join(
+            draw_group(),
+            &["tcp/[::1]:7600".into()],
+            &SharedWaker::default(),
+        );
+        let text = error.err().expect("no interface").to_string();
+        assert!(text.contains("IPv4"), "{text}");
+    }
+}
