@@ -5,7 +5,8 @@ use crate::exit::Failure;
 use crate::interrupt;
 use crate::progress::{RunBar, StageBar};
 use sidestep::kernel::Interrupt;
-use sidestep_session::{Progress, Watcher};
+use sidestep_session::{Progress, Watcher, display_path};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 /// Shows progress, prints warnings, and asks to stop after Ctrl-C.
@@ -63,6 +64,10 @@ impl Watcher for ConsoleWatcher {
         self.console.warn(error);
     }
 
+    fn note_removal(&self, leftover: &Path) {
+        self.console.note(removal_note(leftover));
+    }
+
     fn should_continue(&self) -> bool {
         !interrupt::is_requested()
     }
@@ -70,6 +75,11 @@ impl Watcher for ConsoleWatcher {
     fn interrupt(&self) -> Interrupt {
         interrupt::cycle_interrupt()
     }
+}
+
+/// Returns the words about a folder that a killed process left, and that is removed now.
+pub(crate) fn removal_note(leftover: &Path) -> String {
+    format!("removed {}, which a killed command left there", display_path(leftover))
 }
 
 impl ProgressDisplay {

@@ -4,7 +4,6 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
 /// Returns the name of a file or folder while it is incomplete: `NAME.partial`.
@@ -63,11 +62,14 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
 /// Syncs file by file: other systems have no call for all.
 #[cfg(not(target_os = "linux"))]
 fn sync_tree(folder: &Path) -> io::Result<()> {
+    use crate::leftovers::MARKER;
+    use std::ffi::OsStr;
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         if path.is_dir() {
             sync_tree(&path)?;
-        } else {
+        } else if path.file_name() != Some(OsStr::new(MARKER)) {
+            // To close the marker would release its lock.
             // Open for writing, because Windows flushes only such files.
             File::options().write(true).open(&path)?.sync_all()?;
         }
@@ -124,12 +126,6 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
 #[cfg(not(unix))]
 fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())
-}
-
-/// The error of a folder that cannot be made.
-pub(crate) fn cannot_create(path: &Path, cause: impl std::fmt::Display) -> InputError {
-    let cause = format!("cannot make the folder: {cause}");
-    InputError::new(path.display(), cause, "give a folder in a place where you may write")
 }
 
 #[cfg(test)]

@@ -4,10 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use sidestep_kernel::InputError;
+use sidestep_kernel::ports::RecordError;
 
+use crate::create_error::{CreateError, PathError};
 use crate::disk;
 use crate::file_manifest::{EXPORT, FileManifest};
 use crate::if_exists::IfExists;
+use crate::leftovers::MARKER;
 use crate::replacement::Replacement;
 use crate::run_content::{list_tree, slashed};
 use crate::staging::StagingFolder;
@@ -52,15 +55,23 @@ impl ExportFolder {
     ///
     /// # Errors
     /// Those of [`Self::check`]; a place where none can be made.
-    pub fn create(target: &Path, existing: IfExists) -> Result<Self, InputError> {
+    pub fn create(target: &Path, existing: IfExists) -> Result<Self, CreateError> {
         Self::check(target, existing)?;
         let staging = StagingFolder::new(target)?;
         Ok(Self { target: target.to_path_buf(), staging, existing })
     }
 
-    /// Returns the path under which it is filled.
-    pub fn path(&self) -> &Path {
-        self.staging.path()
+    /// Does work that fills the folder, at the path that it has until then. An error names `target` instead.
+    ///
+    /// # Errors
+    /// Those of `work`.
+    pub fn fill<T, E: PathError>(&self, work: impl FnOnce(&Path) -> Result<T, E>) -> Result<T, E> {
+        self.staging.fill(work)
+    }
+
+    /// Returns the folders that killed processes left beside it, and that are removed now.
+    pub fn leftovers(&self) -> &[PathBuf] {
+        self.staging.leftovers()
     }
 
     /// Lists all files and moves the folder to its place. Files that the earlier folder listed are deleted, all others are in
@@ -68,21 +79,24 @@ impl ExportFolder {
     ///
     /// # Errors
     /// Those of [`Self::check`]; another file that has the name of a new one; an I/O error. The earlier folder stays.
-    pub fn commit(self, program_version: &str) -> Result<(), InputError> {
-        let folder = self.staging.path();
-        self.write_list(program_version)
-            .and_then(|()| Ok(disk::sync_below(folder)?))
-            .map_err(|cause| disk::cannot_create(&self.target, cause))?;
+    pub fn commit(self, program_version: &str) -> Result<(), CreateError> {
+        self.fill(|folder| {
+            write_list(folder, program_version)?;
+            disk::sync_below(folder)
+        })?;
         let old = Self::find_old(&self.target, self.existing)?;
         self.staging.commit(&old)
     }
+}
 
-    fn write_list(&self, program_version: &str) -> Result<(), Box<dyn std::error::Error>> {
-        let folder = self.staging.path();
-        let mut list = FileManifest::new(EXPORT, program_version);
-        for path in list_tree(folder)? {
-            list.files.insert_file(folder, &slashed(&path))?;
-        }
-        Ok(list.write(&folder.join(FileManifest::name_for(EXPORT)))?)
+/// Writes the list of all files in a folder.
+fn write_list(folder: &Path, program_version: &str) -> Result<(), RecordError> {
+    let failed = |e: std::io::Error| RecordError::new(folder.display(), e);
+    let mut list = FileManifest::new(EXPORT, program_version);
+    let files = list_tree(folder).map_err(failed)?;
+    // The marker is no part of the export, and to read it would release its lock.
+    for path in files.iter().filter(|path| *path != Path::new(MARKER)) {
+        list.files.insert_file(folder, &slashed(path)).map_err(failed)?;
     }
+    list.write(&folder.join(FileManifest::name_for(EXPORT)))
 }

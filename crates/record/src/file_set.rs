@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
+use crate::create_error::PathError;
 use crate::disk;
 use crate::file_list::hash_file;
 use crate::file_manifest::FileManifest;
@@ -83,11 +84,12 @@ impl FileSet {
         Err(InputError::new(path.display(), cause, REMEDY))
     }
 
-    /// Makes a file under a temporary name, which `make` gets: it has to be whole and on the disk afterwards.
+    /// Makes a file under a temporary name, which `make` gets: it has to be whole and on the disk afterwards. An error of
+    /// `make` names the file by its later name.
     ///
     /// # Errors
     /// Those of [`Self::check`] and of `make`; an I/O error.
-    pub fn stage<T, E: From<InputError> + From<RecordError>>(
+    pub fn stage<T, E: From<InputError> + PathError>(
         &mut self,
         name: &str,
         make: impl FnOnce(&Path) -> Result<T, E>,
@@ -98,15 +100,17 @@ impl FileSet {
             .map_err(|e| RecordError::new(target.display(), e))?;
         let partial = free_name(&target);
         // Known before it is made, so that a half-written file is deleted too.
-        self.staged.push(TemporaryFile { name: name.into(), partial: partial.clone(), target });
-        make(&partial)
+        let file =
+            TemporaryFile { name: name.into(), partial: partial.clone(), target: target.clone() };
+        self.staged.push(file);
+        make(&partial).map_err(|e| e.with_path(&partial, &target))
     }
 
     /// Makes a file of these bytes under a temporary name.
     ///
     /// # Errors
     /// Those of [`Self::check`]; an I/O error.
-    pub fn stage_bytes<E: From<InputError> + From<RecordError>>(
+    pub fn stage_bytes<E: From<InputError> + PathError>(
         &mut self,
         name: &str,
         bytes: &[u8],
@@ -225,6 +229,12 @@ mod tests {
     impl From<InputError> for Failed {
         fn from(e: InputError) -> Self {
             Self(e.to_string())
+        }
+    }
+
+    impl PathError for Failed {
+        fn with_path(self, from: &Path, to: &Path) -> Self {
+            Self(crate::create_error::replace_path(&self.0, from, to))
         }
     }
 

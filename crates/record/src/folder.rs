@@ -7,6 +7,7 @@ use serde::Serialize;
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::{RecordError, TableSchema};
 
+use crate::create_error::{CREATE_REMEDY, CreateError};
 use crate::disk;
 use crate::file_list::{FileList, SharedFileList};
 use crate::if_exists::IfExists;
@@ -60,6 +61,8 @@ pub struct RunFolder {
     /// How the cycles come about that are recorded from now on.
     pub(crate) cycle_origin: CycleOrigin,
     lock: ProcessLock,
+    /// Folders that killed processes left beside it, and that were removed when it was created.
+    leftovers: Vec<PathBuf>,
 }
 
 impl RunFolder {
@@ -70,7 +73,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// A folder that may not be used; a place where none can be created.
-    pub fn create(path: &Path, run: &NewRun, existing: IfExists) -> Result<Self, InputError> {
+    pub fn create(path: &Path, run: &NewRun, existing: IfExists) -> Result<Self, CreateError> {
         Self::create_with_files(path, run, &[], existing)
     }
 
@@ -83,7 +86,7 @@ impl RunFolder {
         run: &NewRun,
         files: &[(String, Vec<u8>)],
         existing: IfExists,
-    ) -> Result<Self, InputError> {
+    ) -> Result<Self, CreateError> {
         check_vacant(path, existing)?;
         let staging = StagingFolder::new(path)?;
         // Once its parents are made, a path with `..` may lead to a folder that could not be seen before.
@@ -96,21 +99,22 @@ impl RunFolder {
         };
         // A flight is marked before its first cycle: however early it is killed, it is not taken for a simulation.
         manifest.record_progress(0, run.cycle_origin);
-        fill(staging.path(), &mut manifest, scenario, files)
-            .map_err(|e| disk::cannot_create(path, format!("{}: {}", e.place, e.cause)))?;
+        staging.fill(|folder| fill(folder, &mut manifest, scenario, files))?;
         // Another process may be writing the run that `commit` replaces: hold its lock until then.
         let (old_lock, old) = if is_run(path) {
             (Some(lock(path)?), Replacement::of_run(path)?)
         } else {
             (None, Replacement::default())
         };
+        let leftovers = staging.leftovers().to_vec();
         staging.commit(&old)?;
         drop(old_lock);
         let lock = lock(path)?;
         let scenario = scenario.clone();
         let files = SharedFileList::new(manifest.files.clone());
         let cycle_origin = run.cycle_origin;
-        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, lock })
+        let path = path.to_path_buf();
+        Ok(Self { path, manifest, scenario, files, cycle_origin, lock, leftovers })
     }
 
     /// Opens the folder at `path` to continue its run by simulation.
@@ -155,7 +159,8 @@ impl RunFolder {
         })?;
         let files = SharedFileList::new(files);
         let cycle_origin = CycleOrigin::Simulated;
-        Ok(Self { path: path.to_path_buf(), manifest, scenario, files, cycle_origin, lock })
+        let path = path.to_path_buf();
+        Ok(Self { path, manifest, scenario, files, cycle_origin, lock, leftovers: Vec::new() })
     }
 
     /// Checks that the folder is where it was: the system lets a process write on to files of a folder that is gone.
@@ -168,6 +173,11 @@ impl RunFolder {
         }
         let cause = "the folder was deleted, emptied or moved while the run wrote to it: nothing more is written";
         Err(RecordError::new(self.path.display(), cause))
+    }
+
+    /// Returns the folders that killed processes left beside it, and that were removed when it was created.
+    pub fn leftovers(&self) -> &[PathBuf] {
+        &self.leftovers
     }
 
     /// Returns the path of the folder, as it was given.
@@ -329,7 +339,10 @@ pub(crate) fn check_vacant(path: &Path, existing: IfExists) -> Result<(), InputE
     let mut entries = match fs::read_dir(path) {
         Ok(entries) => entries,
         Err(_) if !path.exists() => return Ok(()),
-        Err(e) => return Err(disk::cannot_create(path, e)),
+        Err(e) => {
+            let cause = format!("cannot make the folder: {e}");
+            return Err(InputError::new(path.display(), cause, CREATE_REMEDY));
+        }
     };
     if entries.next().is_none() {
         return Ok(());

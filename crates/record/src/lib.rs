@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod create_error;
 mod disk;
 mod encode;
 mod export_folder;
@@ -9,6 +10,7 @@ mod file_set;
 mod flight;
 mod group;
 mod if_exists;
+mod leftovers;
 mod mcap_request;
 mod origin;
 mod part;
@@ -31,6 +33,7 @@ pub mod run_table;
 pub mod sweep;
 pub mod verify;
 
+pub use create_error::{CreateError, PathError, is_wrong_path, replace_path};
 pub use disk::{missing_folders, remove_folders};
 pub use export_folder::ExportFolder;
 pub use file_list::{DamagedFile, FileFault, FileList, hash_file};

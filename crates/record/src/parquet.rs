@@ -34,6 +34,9 @@ const MAX_SEALS: u32 = 60;
 /// Number of rows with which a part does not grow any more: writing it again takes milliseconds.
 const MAX_GROWING_ROWS: usize = 1 << 16;
 
+/// The end of the causes of errors about tables that others have taken away: no room on the disk would help.
+pub const DELETED_TABLE: &str = "was deleted or moved while the run wrote to it";
+
 /// Writes every table to Parquet files; the [module](self) describes their names.
 pub struct ParquetRecorder {
     tables: Vec<TableWriter>,
@@ -107,9 +110,12 @@ impl ParquetRecorder {
         if let Some(RecordError { place, cause }) = &self.broken {
             return Err(RecordError::new(place, format!("recording stopped earlier: {cause}")));
         }
-        work(&mut self.tables).inspect_err(|e| {
-            self.broken = Some(RecordError::new(&e.place, &e.cause));
-        })
+        let worked = work(&mut self.tables).map_err(|e| {
+            // A file of a folder that is gone fails in many ways, none of which says so.
+            let gone = self.tables.iter().find_map(|table| table.check_in_place().err());
+            gone.unwrap_or(e)
+        });
+        worked.inspect_err(|e| self.broken = Some(RecordError::new(&e.place, &e.cause)))
     }
 }
 
@@ -233,6 +239,7 @@ impl TableWriter {
 
     /// Finishes the open part, if it has rows; later rows start at `next_cycle`.
     fn seal(&mut self, next_cycle: u64) -> Result<(), RecordError> {
+        self.check_in_place()?;
         if self.growing.is_some() {
             return self.seal_growing(next_cycle);
         }
@@ -290,11 +297,38 @@ impl TableWriter {
         Ok(())
     }
 
+    /// Checks that the folder of the table is there: one without rows would miss it only at the end of the run.
+    fn check_in_place(&self) -> Result<(), RecordError> {
+        let partial = disk::partial_path(&self.folder);
+        if self.finished || partial.is_dir() {
+            return Ok(());
+        }
+        let cause = format!("the folder of this table {DELETED_TABLE}");
+        Err(RecordError::new(partial.display(), cause))
+    }
+
+    /// Checks that no part was deleted or moved: rows would be missing in a table that is called complete.
+    fn check_parts(&self) -> Result<(), RecordError> {
+        let partial = disk::partial_path(&self.folder);
+        let of_table = listed_name(&self.schema.name, "");
+        let files = self.files.lock();
+        let mut parts = files.iter().filter_map(|(name, _)| name.strip_prefix(&of_table));
+        match parts.find(|part| !partial.join(part).is_file()) {
+            None => Ok(()),
+            Some(part) => {
+                let cause = format!("this part of the table {DELETED_TABLE}");
+                Err(RecordError::new(partial.join(part).display(), cause))
+            }
+        }
+    }
+
     /// Finishes the table and gives its folder the final name. Later calls do nothing.
     fn finish(&mut self) -> Result<(), RecordError> {
         if self.finished {
             return Ok(());
         }
+        self.check_in_place()?;
+        self.check_parts()?;
         self.write_growing(None)?;
         self.end_part(None)?;
         let partial = disk::partial_path(&self.folder);

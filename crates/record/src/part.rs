@@ -64,10 +64,10 @@ impl PartWriter {
             .set_key_value_metadata(Some(key_values))
             .build();
         let partial = disk::partial_path(&path);
-        let file = File::create(&partial).map_err(|e| RecordError::new(partial.display(), e))?;
+        let file = File::create(&partial).map_err(|e| RecordError::new(path.display(), e))?;
         let file = HashedFile::new(file);
         let file = SerializedFileWriter::new(file, schema, Arc::new(properties))
-            .map_err(|e| RecordError::new(partial.display(), error_cause(e)))?;
+            .map_err(|e| RecordError::new(path.display(), error_cause(e)))?;
         Ok(Self { path, file, checksums: Vec::new() })
     }
 
@@ -76,9 +76,8 @@ impl PartWriter {
         &mut self,
         columns: &mut [ColumnEncoder],
     ) -> std::result::Result<(), RecordError> {
-        let checksum = append_chunks(&mut self.file, columns).map_err(|e| {
-            RecordError::new(disk::partial_path(&self.path).display(), error_cause(e))
-        })?;
+        let checksum = append_chunks(&mut self.file, columns)
+            .map_err(|e| RecordError::new(self.path.display(), error_cause(e)))?;
         self.checksums.push(checksum);
         Ok(())
     }
@@ -97,8 +96,8 @@ impl PartWriter {
         }
         let partial = disk::partial_path(&path);
         let file =
-            file.into_inner().map_err(|e| RecordError::new(partial.display(), error_cause(e)))?;
-        let digest = file.close().map_err(|e| RecordError::new(partial.display(), e))?;
+            file.into_inner().map_err(|e| RecordError::new(path.display(), error_cause(e)))?;
+        let digest = file.close().map_err(|e| RecordError::new(path.display(), e))?;
         disk::rename(&partial, &path)?;
         Ok(digest)
     }

@@ -5,46 +5,95 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use sidestep_kernel::InputError;
+use sidestep_kernel::ports::RecordError;
 
+use crate::create_error::{CREATE_REMEDY, CreateError, PathError};
 use crate::disk;
-use crate::disk::cannot_create;
+use crate::leftovers::{MARKER, remove_leftovers};
+use crate::process_lock::ProcessLock;
 use crate::replacement::Replacement;
 use crate::run_content::list_tree;
 
 /// A folder with a temporary name. If it is dropped, it and the parents created for it are deleted.
 pub(crate) struct StagingFolder {
     path: PathBuf,
+    /// The place as it was given, which errors name.
+    given: PathBuf,
     /// The place that it takes: of a link, the folder that it leads to.
     target: PathBuf,
     /// Parents created for the folder, the outermost first.
     made: Vec<PathBuf>,
+    /// The lock of the marker; `None` once the folder is whole, and where the file system has no locks.
+    lock: Option<ProcessLock>,
+    /// Folders that killed processes left beside it, and that are removed now.
+    leftovers: Vec<PathBuf>,
 }
 
 impl StagingFolder {
-    /// Creates an empty folder in the parent of `target`, and that parent if it is missing.
-    pub(crate) fn new(target: &Path) -> Result<Self, InputError> {
-        let target = resolve_link(target).map_err(|e| cannot_create(target, e))?;
+    /// Creates an empty folder in the parent of `target`, and that parent if it is missing. What killed processes left
+    /// there of the same target is removed.
+    pub(crate) fn new(target: &Path) -> Result<Self, CreateError> {
+        let given = target.to_path_buf();
+        let target = resolve_link(target).map_err(|e| CreateError::from_io(&given, &e))?;
+        let leftovers = remove_leftovers(&target);
         let path = hidden_sibling(&target, "new")?;
         let made = disk::missing_folders(disk::parent(&target));
-        let staging = Self { path, target, made };
-        staging.make().map_err(|e| cannot_create(&staging.target, e))?;
+        let mut staging = Self { path, given, target, made, lock: None, leftovers };
+        staging.make().map_err(|e| CreateError::from_io(&staging.given, &e))?;
         Ok(staging)
     }
 
-    fn make(&self) -> io::Result<()> {
+    fn make(&mut self) -> io::Result<()> {
         fs::create_dir_all(disk::parent(&self.path))?;
-        fs::create_dir(&self.path)
+        fs::create_dir(&self.path)?;
+        let marker = self.path.join(MARKER);
+        self.lock = ProcessLock::acquire(&marker).ok();
+        if self.lock.is_none() {
+            // Without a lock, nothing proves to others that this process is gone: they let the folder be.
+            let _ = fs::remove_file(&marker);
+        }
+        Ok(())
     }
 
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
+    /// Ends the proof that this process fills the folder: from now on no other process removes it.
+    fn remove_marker(&mut self) {
+        if self.lock.take().is_some() {
+            let _ = fs::remove_file(self.path.join(MARKER));
+        }
+    }
+
+    /// Returns the folders that killed processes left beside it, and that are removed now.
+    pub(crate) fn leftovers(&self) -> &[PathBuf] {
+        &self.leftovers
+    }
+
+    /// Does work that fills the folder, at its temporary name. An error names the place as it was given.
+    pub(crate) fn fill<T, E: PathError>(
+        &self,
+        work: impl FnOnce(&Path) -> Result<T, E>,
+    ) -> Result<T, E> {
+        let filled = work(&self.path);
+        // First, because what was deleted is the reason why the work fails, if it does.
+        self.check_in_place()?;
+        filled.map_err(|e| e.with_path(&self.path, &self.given))
+    }
+
+    /// Checks that the folder is still there with what was written first: others may have been removing it just now.
+    fn check_in_place(&self) -> Result<(), RecordError> {
+        let is_gone = |lock: &ProcessLock| !lock.is_at(&self.path.join(MARKER));
+        if self.lock.as_ref().is_some_and(is_gone) {
+            let cause = "what was written so far was deleted or moved meanwhile: nothing is stored";
+            return Err(RecordError::new(self.given.display(), cause));
+        }
+        Ok(())
     }
 
     /// Moves the folder to its place. What is there is replaced: files that `old` calls own are deleted, all others are in
     /// the new folder afterwards.
-    pub(crate) fn commit(mut self, old: &Replacement) -> Result<(), InputError> {
+    pub(crate) fn commit(mut self, old: &Replacement) -> Result<(), CreateError> {
+        self.remove_marker();
         let target = &self.target;
-        let failed = |e: io::Error| cannot_create(target, e);
+        let failed = |e: io::Error| CreateError::from_io(&self.given, &e);
         old.check_room_in(&self.path, target)?;
         // The old folder is kept beside the new one until that is in place: a failure leaves one of them whole.
         let aside = hidden_sibling(target, "old")?;
@@ -63,7 +112,7 @@ impl StagingFolder {
             if replaces {
                 let _ = fs::rename(&aside, target);
             }
-            return Err(cannot_create(target, e.cause));
+            return Err(RecordError::new(self.given.display(), e.cause).into());
         }
         self.made.clear();
         for path in &later {
@@ -94,7 +143,10 @@ fn move_file(from: &Path, to: &Path) -> io::Result<()> {
 
 /// Deletes the given files of a folder, and the folders that are empty then. A file that came meanwhile stays, and with it
 /// its folder.
-fn remove_known<'a>(folder: &Path, known: impl Iterator<Item = &'a PathBuf>) -> io::Result<()> {
+pub(crate) fn remove_known<'a>(
+    folder: &Path,
+    known: impl Iterator<Item = &'a PathBuf>,
+) -> io::Result<()> {
     for path in known {
         let path = folder.join(path);
         let removed = if path.is_dir() && !path.is_symlink() {
@@ -112,7 +164,7 @@ fn remove_known<'a>(folder: &Path, known: impl Iterator<Item = &'a PathBuf>) -> 
 }
 
 /// Removes a folder if there is no file below it.
-fn remove_empty(folder: &Path) {
+pub(crate) fn remove_empty(folder: &Path) {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     for entry in entries.filter(|entry| entry.file_type().is_ok_and(|ty| ty.is_dir())) {
         remove_empty(&entry.path());
@@ -123,6 +175,7 @@ fn remove_empty(folder: &Path) {
 
 impl Drop for StagingFolder {
     fn drop(&mut self) {
+        self.remove_marker();
         // Everything in it was written or linked by this process.
         let all = list_tree(&self.path).unwrap_or_default();
         let _ = remove_known(&self.path, all.iter());
@@ -149,10 +202,20 @@ pub fn resolve_link(target: &Path) -> io::Result<PathBuf> {
         .map_err(|e| io::Error::new(e.kind(), format!("a link to what is not there ({e})")))
 }
 
-/// Returns a hidden name in the same folder that nothing has: what a killed process left is not touched.
+/// Returns how the hidden names of folders begin that take a place, or made room for one there; a process id follows.
+pub(crate) fn hidden_prefix(target: &Path, role: &str) -> Option<String> {
+    Some(format!(".{}.{role}-", target.file_name()?.display()))
+}
+
+/// Returns a hidden name in the same folder that nothing has.
 fn hidden_sibling(target: &Path, role: &str) -> Result<PathBuf, InputError> {
-    let name = target.file_name().ok_or_else(|| cannot_create(target, "it has no name"))?;
-    let name = format!(".{}.{role}-{}", name.display(), std::process::id());
+    let cannot_create = |target: &Path, cause: &str| {
+        let cause = format!("cannot make the folder: {cause}");
+        InputError::new(target.display(), cause, CREATE_REMEDY)
+    };
+    let prefix =
+        hidden_prefix(target, role).ok_or_else(|| cannot_create(target, "it has no name"))?;
+    let name = format!("{prefix}{}", std::process::id());
     let folder = disk::parent(target);
     let names = (0..).map(|k| if k == 0 { name.clone() } else { format!("{name}-{k}") });
     let mut paths = names.map(|name| folder.join(name));

@@ -1,7 +1,8 @@
 //! Files that are written completely or not at all.
 
 use crate::Error;
-use sidestep_record::{free_name, missing_folders, remove_folders, resolve_link};
+use sidestep_kernel::InputError;
+use sidestep_record::{PathError, free_name, missing_folders, remove_folders, resolve_link};
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
 use std::path::{Path, PathBuf};
@@ -50,15 +51,16 @@ pub(crate) fn replace_atomically<T>(
     make: impl FnOnce(&Path) -> std::result::Result<T, Error>,
 ) -> std::result::Result<T, Error> {
     // A link stays: the file that it leads to is replaced.
-    let path = &resolve_link(path).map_err(|e| Error::cannot_write(path, &e))?;
+    let wrong = |cause: &str| InputError::new(path.display(), cause, "give a file, or a new name");
+    let path = &resolve_link(path).map_err(|e| wrong(&e.to_string()))?;
     if std::fs::symlink_metadata(path).is_ok_and(|found| !found.is_file()) {
-        return Err(Error::cannot_write(path, &std::io::Error::other("this is no file")));
+        return Err(wrong("this is no file").into());
     }
     // Beside the target, because a file is renamed in one step only within its file system; with the process id,
     // because two processes may write the same file at once.
     let partial = &free_name(path);
     let folders = missing_folders(path.parent().unwrap_or(path));
-    let made = make(partial).and_then(|made| {
+    let made = make(partial).map_err(|e| e.with_path(partial, path)).and_then(|made| {
         std::fs::rename(partial, path).map_err(|e| Error::cannot_write(path, &e))?;
         Ok(made)
     });
@@ -100,6 +102,44 @@ mod tests {
         assert!(fails.is_err());
         assert_eq!(std::fs::read(&path).expect("read"), b"old");
         assert_eq!(std::fs::read_dir(folder.path()).expect("read").count(), 1);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_link_stays_and_its_file_is_replaced_and_what_is_no_file_is_refused_and_stays() {
+        use std::os::unix::fs::{FileTypeExt, symlink};
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("file"), "old").expect("written");
+        symlink(at("file"), at("link")).expect("linked");
+        write_atomically(&at("link"), |f| f.write_all(b"new")).expect("written");
+        assert!(at("link").is_symlink());
+        assert_eq!(std::fs::read(at("file")).expect("read"), b"new");
+        symlink(at("nowhere"), at("lost")).expect("linked");
+        std::fs::create_dir(at("folder")).expect("made");
+        let made = std::process::Command::new("mkfifo").arg(at("pipe")).status();
+        assert!(made.expect("mkfifo is there").success());
+        let names = || {
+            let entries = std::fs::read_dir(folder.path()).expect("a folder");
+            let mut names: Vec<_> = entries.map(|e| e.expect("an entry").file_name()).collect();
+            names.sort();
+            names
+        };
+        let before = names();
+        let refused = [
+            ("lost", "a link to what is not there"),
+            ("folder", "this is no file"),
+            ("pipe", "this is no file"),
+        ];
+        for (name, why) in refused {
+            let error = write_atomically(&at(name), |_| unreachable!("nothing is written"));
+            let told = error.expect_err(name).to_string();
+            assert!(told.contains(why) && told.contains(name), "{told}");
+            assert_eq!(names(), before, "{name}");
+        }
+        assert!(at("lost").is_symlink() && at("folder").is_dir());
+        let pipe = std::fs::symlink_metadata(at("pipe")).expect("there");
+        assert!(pipe.file_type().is_fifo());
     }
 
     #[test]

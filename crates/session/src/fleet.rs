@@ -4,6 +4,7 @@
 //! standard input ends: the process that started it is gone, or wants it to end. So no process is left over, however
 //! its parent has ended.
 
+use crate::error::STORAGE_REMEDY;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::text::KeyValues;
 use sidestep_kernel::view::{Frame, Scenery};
@@ -345,6 +346,7 @@ impl From<&crate::Error> for JobError {
                 Self { is_interrupted: true, ..stopped(error.to_string(), none()) }
             }
             crate::Error::Other { cause, remedy } => stopped(cause.clone(), remedy.clone()),
+            crate::Error::Record(error) => stopped(error.to_string(), STORAGE_REMEDY.to_string()),
             other => stopped(other.to_string(), none()),
         }
     }

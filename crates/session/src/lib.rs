@@ -55,7 +55,7 @@ pub mod report;
 pub mod sweep;
 
 pub use driver::{RunTiming, Sinks, drive};
-pub use error::Error;
+pub use error::{Error, STORAGE_REMEDY};
 pub use files::{display_path, write_atomically};
 pub use flight::{CutFlight, close_flight, cut_off_text};
 pub use flight_recorder::FlightRecorder;

@@ -15,6 +15,7 @@ use sidestep_kernel::ports::{ColumnValues, RecordError, Recorder, TableSchema};
 use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, InputError, Simulation};
+use sidestep_record::parquet::DELETED_TABLE;
 use sidestep_record::{CycleOrigin, IfExists, McapRecorder, RunFolder, RunReader, Status};
 use sidestep_scenario::{CompiledScenario, ImportedScenario, ResolvedScenario, Source, Worlds};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -316,11 +317,19 @@ impl ManagedRun {
         Ok(rows.take(self.run.cycle()).into_iter().chain(frames).collect())
     }
 
+    /// Tells a watcher which folders killed processes had left beside that of the run, and that were removed when it was
+    /// made.
+    pub fn note_removals(&self, watcher: &dyn Watcher) {
+        let leftovers = self.recording.iter().flat_map(|recording| recording.folder().leftovers());
+        leftovers.for_each(|leftover| watcher.note_removal(leftover));
+    }
+
     /// Drives the run to its end, or until the watcher asks to stop, and stores everything.
     ///
     /// # Errors
     /// When something cannot be stored; a bug of the simulation.
     pub fn run_to_end(mut self, watcher: &dyn Watcher) -> Result<Summary, Error> {
+        self.note_removals(watcher);
         let until = self.until.unwrap_or(self.run.config().cycles);
         self.advance_to(until, watcher)?;
         self.finish(watcher)
@@ -516,6 +525,9 @@ fn storage_error(
     let is_gone = recording.is_some_and(|recording| recording.folder().check_in_place().is_err());
     let remedy = match recording.map(|r| (r.folder().path(), r.is_in_flight())) {
         _ if is_gone => "if it was moved, `sidestep resume DIR` continues it at its new place; else run the scenario again".into(),
+        Some(_) if error.cause.ends_with(DELETED_TABLE) => {
+            "put back what was deleted or moved, or run the scenario again in a new folder".into()
+        }
         Some((folder, false)) => {
             format!("make room, then continue with `{}`", sidestep_command("resume", folder))
         }

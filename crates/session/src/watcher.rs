@@ -2,6 +2,7 @@
 
 use crate::Error;
 use sidestep_kernel::{Cycle, Interrupt};
+use std::path::Path;
 
 /// The progress of work.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +45,9 @@ pub trait Watcher: Sync {
     /// Called with a failure that stops nothing, e.g. of the picture of a run.
     fn warn(&self, _: &Error) {}
 
+    /// Called with a folder that a killed process left while it wrote to the same place, and that is removed now.
+    fn note_removal(&self, _: &Path) {}
+
     /// Returns whether work shall continue; asked between slices of a run.
     fn should_continue(&self) -> bool {
         true
@@ -68,6 +72,10 @@ pub(crate) struct NestedWatcher<'a>(pub(crate) &'a dyn Watcher);
 impl Watcher for NestedWatcher<'_> {
     fn warn(&self, error: &Error) {
         self.0.warn(error);
+    }
+
+    fn note_removal(&self, leftover: &Path) {
+        self.0.note_removal(leftover);
     }
 
     fn should_continue(&self) -> bool {

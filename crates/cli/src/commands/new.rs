@@ -9,7 +9,7 @@ use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep::kernel::shell::sidestep_command;
 use sidestep::scenario::WorldType;
-use sidestep_record::{missing_folders, remove_folders};
+use sidestep_record::{is_wrong_path, missing_folders, remove_folders};
 use sidestep_session::display_path;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -56,10 +56,14 @@ pub(crate) fn new(args: &NewArgs, console: Console) -> Result<ExitCode, Failure>
     Ok(ExitCode::Done)
 }
 
-fn write_new(path: &Path, text: &str) -> Result<(), InputError> {
+fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     create_with_text(path, text).map_err(|e| {
         let remedy = "give a file that does not exist yet, in a folder where you may write, on a disk with room";
-        InputError::new(path.display(), format!("cannot create the file: {e}"), remedy)
+        if is_wrong_path(&e) {
+            let cause = format!("cannot create the file: {e}");
+            return InputError::new(path.display(), cause, remedy).into();
+        }
+        Failure::other(format!("cannot create {}: {e}", path.display()), remedy)
     })
 }
 

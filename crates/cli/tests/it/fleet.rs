@@ -103,6 +103,34 @@ fn ctrl_c_ends_a_fleet_in_good_order() {
     assert!(folder.is_ok(), "it can be looked at: {:?}", folder.err());
 }
 
+#[test]
+fn a_fleet_whose_folder_or_table_is_deleted_while_it_flies_ends_and_names_it() {
+    if !is_there() {
+        return;
+    }
+    let realtime = ["--clock", "realtime", "--speed", "30"];
+    for (clock, gone) in [
+        (&[][..], "r"),
+        (&realtime, "r"),
+        (&realtime, "r/trajectories.partial"),
+        (&realtime, "r/events.partial"),
+    ] {
+        let place = place();
+        let endless = ["fleet", "ring.toml", "--cycles", "1000000", "--out", "r", "--json"];
+        let far = ["--set", "airspace.generator.radius_m=1000000"];
+        let child = place.start(&[&endless[..], &far, clock].concat());
+        let tables = ["r/events.partial", "r/trajectories.partial"];
+        wait_for("the tables", || tables.iter().all(|table| place.path(table).exists()));
+        std::fs::rename(place.path(gone), place.path("gone")).expect("moved");
+        let ended = CommandOutput(child.wait_with_output().expect("ended"));
+        assert_eq!((ended.code(), ended.out().as_str()), (1, ""), "{gone}: {}", ended.err());
+        let told = ended.err();
+        assert!(told.contains(gone) && told.contains("deleted"), "{gone}: {told}");
+        assert!(told.contains("help:"), "{gone}: {told}");
+        assert!(!place.path(gone).exists(), "{gone}");
+    }
+}
+
 /// Waits until a fleet reports where its server listens; returns the endpoint.
 fn endpoint(fleet: &mut Child) -> String {
     let mut lines = BufReader::new(fleet.stderr.as_mut().expect("errors")).lines();

@@ -24,6 +24,7 @@ mod input;
 mod inspect;
 mod kills;
 mod learn;
+mod leftovers;
 mod names;
 mod output;
 mod own;

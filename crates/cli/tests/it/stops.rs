@@ -154,6 +154,43 @@ fn a_run_whose_folder_is_deleted_moved_or_replaced_ends_at_once_and_writes_nowhe
 }
 
 #[test]
+fn a_run_whose_table_is_deleted_ends_at_the_next_seal_and_names_it() {
+    for table in ["trajectories", "events"] {
+        let place = TestFolder::new();
+        let child = place.start(&[&ENDLESS[..], &["--json"]].concat());
+        wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
+        // In one step, as a deletion is not: it would meet new files.
+        let folder = format!("r/{table}.partial");
+        std::fs::rename(place.path(&folder), place.path("gone")).expect("moved");
+        let ended = CommandOutput(child.wait_with_output().expect("ended"));
+        assert_eq!((ended.code(), ended.out().as_str()), (1, ""), "{}", ended.err());
+        for word in [&*folder, "was deleted or moved", "help: put back"] {
+            assert!(ended.err().contains(word), "{word}: {}", ended.err());
+        }
+        assert_ne!(manifest(&place)["status"], "complete");
+        assert!(!place.path(&folder).exists() && !place.path(&format!("r/{table}")).exists());
+        // The remedy works.
+        std::fs::rename(place.path("gone"), place.path(&folder)).expect("moved back");
+        let more = (manifest(&place)["cycles_done"].as_u64().expect("cycles") + 10).to_string();
+        assert_eq!(place.run(&["resume", "r", "--cycles", &more]).code(), 0);
+    }
+}
+
+#[test]
+fn a_run_of_whose_table_a_part_is_deleted_is_not_called_complete() {
+    let place = TestFolder::new();
+    let child = place.start(&[&LONG[..], &["--out", "r", "--json"]].concat());
+    let first = place.path("r/trajectories.partial").join("part-000000000000000.parquet");
+    wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());
+    std::fs::remove_file(&first).expect("removed");
+    let ended = CommandOutput(child.wait_with_output().expect("ended"));
+    assert_eq!((ended.code(), ended.out().as_str()), (1, ""), "{}", ended.err());
+    assert!(ended.err().contains("part-000000000000000.parquet"), "{}", ended.err());
+    assert_ne!(manifest(&place)["status"], "complete");
+    assert!(!place.path("r/trajectories").exists());
+}
+
+#[test]
 fn resume_tells_how_to_get_the_mcap_file_that_a_kill_left_incomplete() {
     let place = TestFolder::new();
     let args = ["--out", "r", "--mcap", "it's.mcap", "--mcap-every", "50"];

@@ -196,6 +196,10 @@ impl<'a> SmallDisk<'a> {
     pub(crate) fn grow(&self, size: &str) {
         assert!(mount(&["-o", &format!("remount,size={size}")], self.0));
     }
+
+    pub(crate) fn forbid_writing(&self) {
+        assert!(mount(&["-o", "remount,ro"], self.0));
+    }
 }
 
 impl Drop for SmallDisk<'_> {

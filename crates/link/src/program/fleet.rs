@@ -35,6 +35,7 @@ use sidestep_session::fleet::{
 use sidestep_session::{Error, ManagedRun, OutputPaths, Watcher};
 use std::collections::BTreeMap;
 use std::net::SocketAddrV4;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Time between two reports to the parent process: nodes report as often.
@@ -67,6 +68,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let paths = OutputPaths { folder, mcap: None, replace: job.replace, cycle_origin };
     // One worker, because the agents' decisions, which take most of the time, are made by the nodes.
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
+    run.note_removals(&WarningLogger);
     print_message(&LinkMessage::Listens(listen.clone()));
     let scene = view::scene_json(&viewer_scene(run.simulation()));
     let views = ViewPublisher::new(ViewServer::start(&wire, scene).map_err(endpoint_error)?);
@@ -218,6 +220,10 @@ struct WarningLogger;
 impl Watcher for WarningLogger {
     fn warn(&self, error: &Error) {
         tracing::warn!("{error}");
+    }
+
+    fn note_removal(&self, leftover: &Path) {
+        tracing::warn!("removed {}, which a killed process left there", leftover.display());
     }
 }
 

@@ -9,6 +9,7 @@ use sidestep_kernel::ports::{ColumnWithRole, RecordError};
 use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::{Digest, InputError};
 
+use crate::create_error::{CreateError, PathError};
 use crate::disk;
 use crate::file_list::FileList;
 use crate::file_manifest::FileManifest;
@@ -57,6 +58,8 @@ pub struct SweepFolder<P> {
     path: PathBuf,
     manifest: SweepManifest<P>,
     seal: Seal,
+    /// Folders that killed processes left beside it, and that were removed when it was created.
+    leftovers: Vec<PathBuf>,
 }
 
 /// A folder that is deleted when this is dropped.
@@ -88,7 +91,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     ///
     /// # Errors
     /// Something else is there, no folder can be created there, or `fill` fails.
-    pub fn create<R: Serialize, E: From<InputError> + From<RecordError>>(
+    pub fn create<R: Serialize, E: From<InputError> + PathError>(
         path: &Path,
         program_version: &str,
         build: &str,
@@ -102,28 +105,36 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             return Err(InputError::new(path.display(), cause, remedy).into());
         }
         check_vacant(path, crate::IfExists::Refuse)?;
-        let staging = StagingFolder::new(path)?;
+        let staging = StagingFolder::new(path).map_err(CreateError::into_error::<E>)?;
         check_vacant(path, crate::IfExists::Refuse)?;
-        let (plan, fingerprints, cells) = fill(staging.path())?;
-        make_folder(&staging.path().join(SHARES))?;
-        let cells: Vec<_> = cells.iter().collect();
-        let mut table =
-            run_table::stream(&staging.path().join(CELLS), &cells, program_version, &[])?;
-        let mut files = FileList::default();
-        files.insert(CELLS, table.close()?);
-        table.finish()?;
-        let manifest = SweepManifest {
-            format: format::CURRENT,
-            program_version: program_version.into(),
-            build: Some(build.into()),
-            fingerprints,
-            plan,
-            files,
-        };
-        sealed_json::write_sealed(&staging.path().join(MANIFEST), &manifest)?;
-        disk::sync_below(staging.path())?;
-        staging.commit(&Replacement::default())?;
-        Ok(Self { path: path.to_path_buf(), manifest, seal: Seal::Confirmed })
+        let manifest = staging.fill(|folder| {
+            let (plan, fingerprints, cells) = fill(folder)?;
+            make_folder(&folder.join(SHARES))?;
+            let cells: Vec<_> = cells.iter().collect();
+            let mut table = run_table::stream(&folder.join(CELLS), &cells, program_version, &[])?;
+            let mut files = FileList::default();
+            files.insert(CELLS, table.close()?);
+            table.finish()?;
+            let manifest = SweepManifest {
+                format: format::CURRENT,
+                program_version: program_version.into(),
+                build: Some(build.into()),
+                fingerprints,
+                plan,
+                files,
+            };
+            sealed_json::write_sealed(&folder.join(MANIFEST), &manifest)?;
+            disk::sync_below(folder)?;
+            Ok::<_, E>(manifest)
+        })?;
+        let leftovers = staging.leftovers().to_vec();
+        staging.commit(&Replacement::default()).map_err(CreateError::into_error::<E>)?;
+        Ok(Self { path: path.to_path_buf(), manifest, seal: Seal::Confirmed, leftovers })
+    }
+
+    /// Returns the folders that killed processes left beside it, and that were removed when it was created.
+    pub fn leftovers(&self) -> &[PathBuf] {
+        &self.leftovers
     }
 
     /// Writes the scenario of a variant, and the files it names, into a folder that
@@ -163,7 +174,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             return Err(InputError::new(path.display(), cause, remedy));
         }
         let (manifest, seal) = sealed_json::read_sealed(&path.join(MANIFEST))?;
-        Ok(Self { path: path.to_path_buf(), manifest, seal })
+        Ok(Self { path: path.to_path_buf(), manifest, seal, leftovers: Vec::new() })
     }
 
     /// Returns whether the manifest confirms its own content; that of older versions has no digest.

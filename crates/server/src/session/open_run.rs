@@ -383,11 +383,15 @@ fn recording_is_read_only(place: &str) -> Problem {
     Problem::new(place, "a recording is computed again as it was", remedy)
 }
 
+/// The page has no option --out, which the command's remedy names.
+const STORAGE_REMEDY: &str = "check the file, and the space on the disk";
+
 /// Converts an error of a session.
 pub(crate) fn problem_of(error: &Error) -> Problem {
     match error {
         Error::Input(error) => problem(error),
         Error::Other { cause, remedy } => Problem::new("", cause.as_str(), remedy.as_str()),
-        other => Problem::new("", other.to_string(), "check the file, and the space on the disk"),
+        Error::Record(error) => Problem::new("", error.to_string(), STORAGE_REMEDY),
+        other => Problem::new("", other.to_string(), STORAGE_REMEDY),
     }
 }

@@ -193,7 +193,7 @@ fn export_bag(job: &ExportContext<'_>) -> Result<ExportResult, Error> {
     let target = Target::for_folder(job, "-rosbag")?;
     let mut run = job.run_up_to(span.from)?;
     let every = wanted.every.unwrap_or(1);
-    let is_confirmed = target.write_folder(|folder| {
+    let is_confirmed = target.write_folder(job.watcher, |folder| {
         let mut sink = BagSink::start(folder, every, run.as_mut())?;
         let sinks = Sinks { frames: Some(&mut sink), ..Sinks::default() };
         job.drive(run.as_mut(), span.until, sinks)?;

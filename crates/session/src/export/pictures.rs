@@ -66,7 +66,7 @@ pub(super) fn export_frames(
     let target = Target::for_folder(job, "-frames")?;
     export_animation(job, options, &target, |animation| {
         let width_px = options.width_px.unwrap_or(DEFAULT_FRAME_WIDTH_PX);
-        target.write_folder(|folder| animation.write_frames(width_px, folder))
+        target.write_folder(job.watcher, |folder| animation.write_frames(width_px, folder))
     })
 }
 
@@ -123,7 +123,7 @@ impl Animation<'_> {
             let png = self.draw(&view, index, &watched)?.to_png()?;
             // Numbers start at 1, as ffmpeg expects.
             let path = folder.join(format!("frame-{:05}.png", index + 1));
-            std::fs::write(&path, png).map_err(|e| Error::cannot_write(&path, &e))?;
+            std::fs::write(&path, png).map_err(|e| Error::cannot_store(&path, &e))?;
         }
         Ok(())
     }

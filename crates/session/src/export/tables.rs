@@ -45,7 +45,7 @@ pub(super) fn export(
         None => {
             let names = tables(source.folder)?;
             let target = Target::for_folder(job, &format!("-{ending}"))?;
-            target.write_folder(|partial| {
+            target.write_folder(job.watcher, |partial| {
                 for name in &names {
                     source.write(name, &partial.join(format!("{name}.{ending}")))?;
                 }
@@ -107,7 +107,7 @@ impl<'a> TableExport<'a> {
         for range in &recorded.origins {
             let _ = writeln!(text, "{},{},{}", range.from, range.until, range.origin.name());
         }
-        std::fs::write(to, text).map_err(|e| Error::cannot_write(to, &e))
+        std::fs::write(to, text).map_err(|e| Error::cannot_store(to, &e))
     }
 
     /// Passes on the requested rows, block by block.
@@ -143,15 +143,15 @@ impl<'a> TableExport<'a> {
     }
 
     fn write_csv(&self, name: &str, to: &Path) -> Result<(), Error> {
-        let file = File::create_new(to).map_err(|e| Error::cannot_write(to, &e))?;
+        let file = File::create_new(to).map_err(|e| Error::cannot_store(to, &e))?;
         let mut csv = csv::Writer::from_writer(BufWriter::new(file));
         let mut has_heading = false;
         self.for_each_block_of(name, |block| {
             let written = append_block(&mut csv, &block, !has_heading);
             has_heading = true;
-            written.map_err(|e| Error::cannot_write(to, &io::Error::from(e)))
+            written.map_err(|e| Error::cannot_store(to, &io::Error::from(e)))
         })?;
-        close(csv).map_err(|e| Error::cannot_write(to, &e))
+        close(csv).map_err(|e| Error::cannot_store(to, &e))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::ExportContext;
 use crate::files::{resolve_path, write_file};
-use crate::{Error, VERSION};
+use crate::{Error, VERSION, Watcher};
 use sidestep_kernel::InputError;
 use sidestep_record::{EXPORT, ExportFolder, FileManifest, FileSet, IfExists, McapRecorder};
 use std::ffi::OsStr;
@@ -114,7 +114,7 @@ impl Target {
         write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
     ) -> Result<(), Error> {
         self.write_file(|partial| {
-            write_file(partial, write).map_err(|e| Error::cannot_write(&self.path, &e))
+            write_file(partial, write).map_err(|e| Error::cannot_store(&self.path, &e))
         })
     }
 
@@ -125,10 +125,12 @@ impl Target {
     /// The error of `fill`, or an I/O error; nothing is left then.
     pub(super) fn write_folder<T>(
         &self,
+        watcher: &dyn Watcher,
         fill: impl FnOnce(&Path) -> Result<T, Error>,
     ) -> Result<T, Error> {
         let folder = ExportFolder::create(&self.path, self.existing)?;
-        let filled = fill(folder.path())?;
+        folder.leftovers().iter().for_each(|leftover| watcher.note_removal(leftover));
+        let filled = folder.fill(fill)?;
         folder.commit(VERSION)?;
         Ok(filled)
     }

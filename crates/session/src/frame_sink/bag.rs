@@ -41,7 +41,7 @@ impl BagSink {
         if let Some(floor) = &run.scenery().floor {
             for (name, bytes) in map_files_with_border(floor) {
                 let path = folder.join(name);
-                std::fs::write(&path, bytes).map_err(|e| Error::cannot_write(&path, &e))?;
+                std::fs::write(&path, bytes).map_err(|e| Error::cannot_store(&path, &e))?;
             }
         }
         run.enable_odometry();

@@ -72,7 +72,7 @@ impl<'a> OutcomeBuckets<'a> {
             BucketStorage::Files(folder, files) => {
                 let k = outcome.trial / self.trials;
                 if let Err(error) = write_line(&mut files[k as usize], outcome) {
-                    self.failure = Some(Error::cannot_write(&bucket_path(folder, k), &error));
+                    self.failure = Some(Error::cannot_store(&bucket_path(folder, k), &error));
                 }
             }
         }
@@ -99,11 +99,11 @@ impl<'a> OutcomeBuckets<'a> {
         for (k, file) in (0..).zip(files) {
             // Flushes the buffer and closes the file.
             file.into_inner()
-                .map_err(|e| Error::cannot_write(&bucket_path(&folder, k), e.error()))?;
+                .map_err(|e| Error::cannot_store(&bucket_path(&folder, k), e.error()))?;
         }
         for k in 0..count {
             let rows = read_bucket(&bucket_path(&folder, k))
-                .map_err(|e| Error::cannot_write(folder.path(), &e))?;
+                .map_err(|e| Error::cannot_store(folder.path(), &e))?;
             if k == 0 || !rows.is_empty() {
                 each(rows.build_block(self.plan, &self.schema, &self.pilots)?)?;
             }
@@ -117,7 +117,7 @@ impl BucketStorage {
         let mut files = Vec::new();
         for k in 0..count {
             let path = bucket_path(&folder, k);
-            let file = File::create(&path).map_err(|e| Error::cannot_write(&path, &e))?;
+            let file = File::create(&path).map_err(|e| Error::cannot_store(&path, &e))?;
             files.push(BufWriter::new(file));
         }
         Ok(Self::Files(folder, files))

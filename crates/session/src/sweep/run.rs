@@ -17,6 +17,7 @@ use sidestep_experiment::sweep::{
     Outcome, Plan, RunTable, RunTableBuilder, Shard, Sweep, Trial, rows::trial_table,
 };
 use sidestep_kernel::InputError;
+use sidestep_kernel::ports::RecordError;
 use sidestep_kernel::shell::sidestep_command;
 use sidestep_record::sweep::{ResultsWriter, fingerprint};
 use sidestep_scenario::{ResolvedScenario, Source, Worlds};
@@ -97,7 +98,7 @@ pub fn create(
     workers: usize,
     watcher: &dyn Watcher,
 ) -> Result<Folder, Error> {
-    Folder::create(out, VERSION, worlds.build(), |staging| {
+    let folder = Folder::create(out, VERSION, worlds.build(), |staging| {
         let (plan, fingerprints) =
             prepare(worlds, sweep, workers, watcher, &|k, source, compiled| {
                 let ResolvedScenario { text, files } = compiled.resolve(source)?;
@@ -106,7 +107,9 @@ pub fn create(
             })?;
         let trials = trial_table(&plan).columns;
         Ok::<_, Error>((plan, fingerprints, trials))
-    })
+    })?;
+    folder.leftovers().iter().for_each(|leftover| watcher.note_removal(leftover));
+    Ok(folder)
 }
 
 /// Plans a sweep into a folder, or opens the folder if it holds the same sweep already.
@@ -181,7 +184,7 @@ pub fn run_remaining<'a>(
                 .map_err(|e| with_resume_hint(e, folder.path()))?;
             Ok(())
         })?;
-        journal.sync()?;
+        journal.sync().map_err(|e| with_resume_hint(e.into(), folder.path()))?;
     }
     if !watcher.should_continue() {
         return Ok(SweepEnd::Interrupted(scheduler.finished.len()));
@@ -189,8 +192,18 @@ pub fn run_remaining<'a>(
     join_runs(folder, BUCKET_TRIALS, effort, watcher)
 }
 
-/// Joins all runs into the sweep's tables, in blocks of a number of trials: only one block is in memory at a time.
+/// Joins all runs into the sweep's tables, in blocks of a number of trials: only one block is in memory at a time. An error
+/// of storage says how to go on.
 fn join_runs(
+    folder: &Folder,
+    trials: u64,
+    effort: SweepTiming,
+    watcher: &dyn Watcher,
+) -> Result<SweepEnd, Error> {
+    join_blocks(folder, trials, effort, watcher).map_err(|e| with_resume_hint(e, folder.path()))
+}
+
+fn join_blocks(
     folder: &Folder,
     trials: u64,
     effort: SweepTiming,
@@ -275,12 +288,14 @@ pub fn run_share(
             .map_err(|e| with_resume_hint(e, folder.path()))?;
         Ok(())
     })?;
-    journal.sync()?;
+    let with_hint = |e: RecordError| with_resume_hint(e.into(), folder.path());
+    journal.sync().map_err(with_hint)?;
     if !watcher.should_continue() {
         return Ok(SweepEnd::Interrupted(scheduler.finished.len()));
     }
     let table = rows.build(plan)?;
-    folder.finish_share(to_share(shard), journal, &table.columns.iter().collect::<Vec<_>>())?;
+    let columns: Vec<_> = table.columns.iter().collect();
+    folder.finish_share(to_share(shard), journal, &columns).map_err(with_hint)?;
     Ok(SweepResult::complete(table, effort))
 }
 

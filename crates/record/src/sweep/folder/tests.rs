@@ -2,6 +2,7 @@
 
 use super::super::shares::Share;
 use super::*;
+use crate::create_error::replace_path;
 use crate::run_table::LoadedTable;
 use sidestep_kernel::ports::ColumnValues;
 
@@ -14,6 +15,12 @@ struct Failed(String);
 impl From<InputError> for Failed {
     fn from(e: InputError) -> Self {
         Self(e.to_string())
+    }
+}
+
+impl PathError for Failed {
+    fn with_path(self, from: &Path, to: &Path) -> Self {
+        Self(replace_path(&self.0, from, to))
     }
 }
 
