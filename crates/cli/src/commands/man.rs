@@ -3,11 +3,12 @@
 use crate::args;
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
-use clap::Args;
+use clap::{Args, Command};
+use clap_mangen::Man;
 use serde_json::json;
 use sidestep::kernel::InputError;
-use sidestep_session::display_path;
-use std::path::{Path, PathBuf};
+use sidestep_session::{display_path, write_atomically};
+use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -27,17 +28,33 @@ pub(crate) struct ManArgs {
 /// When the folder cannot be written to.
 pub(crate) fn man(args: &ManArgs, console: Console) -> Result<ExitCode, Failure> {
     let folder = &args.folder;
-    write_pages(folder).map_err(|e| {
+    if folder.exists() && !folder.is_dir() {
         let remedy = "give a folder where you may write";
-        InputError::new(folder.display(), format!("cannot write manual pages: {e}"), remedy)
-    })?;
+        return Err(InputError::new(folder.display(), "this is no folder", remedy).into());
+    }
+    for page in pages() {
+        let path = folder.join(page.get_filename());
+        write_atomically(&path, |file| page.render(file))?;
+    }
     console.print_result(&json!({ "folder": display_path(folder) }), || {
         format!("Wrote manual pages to {}.\n", folder.display())
     })?;
     Ok(ExitCode::Done)
 }
 
-fn write_pages(folder: &Path) -> std::io::Result<()> {
-    std::fs::create_dir_all(folder)?;
-    clap_mangen::generate_to(args::command(), folder)
+/// Returns the pages of all commands that are not hidden, that of `sidestep` itself last.
+fn pages() -> Vec<Man> {
+    let mut command = args::command().disable_help_subcommand(true);
+    // The names of pages are those of whole commands, such as `sidestep-run`, once this is done.
+    command.build();
+    let mut pages = Vec::new();
+    add_pages(&command, &mut pages);
+    pages
+}
+
+fn add_pages(command: &Command, pages: &mut Vec<Man>) {
+    for subcommand in command.get_subcommands().filter(|command| !command.is_hide_set()) {
+        add_pages(subcommand, pages);
+    }
+    pages.push(Man::new(command.clone()));
 }
