@@ -10,6 +10,7 @@ use sidestep_experiment::sweep::Sweep;
 use sidestep_import::traffic::{self, TrafficOptions};
 use sidestep_import::{ForeignFormat, bag, carmen, clean_map};
 use sidestep_kernel::InputError;
+use sidestep_kernel::shell::sidestep_command;
 use sidestep_record::sweep::SweepFolder;
 use sidestep_record::{McapRunInfo, RunReader, Status, is_mcap, origins_text, row_count, tables};
 use sidestep_scenario::file::{packed_error, read_start};
@@ -56,6 +57,9 @@ fn report(worlds: &Worlds, path: &Path, options: &ImportOptions) -> Result<Impor
         check_no_options(path, options)?;
         return Ok(format.inspect(path)?);
     }
+    if path.is_dir() {
+        return Err(unknown_folder(path).into());
+    }
     if let Some(imported) = worlds.import_scenario(path, options)? {
         return match imported.scenario {
             Ok(_) => Ok(imported.report),
@@ -99,6 +103,11 @@ fn own_text(worlds: &Worlds, path: &Path) -> Result<ImportReport, Error> {
     report.add_kept("runs of each", sweep.replicates as usize);
     report.add_remarks(&worlds.compile(&Source::read(&sweep.scenario, &[])?)?.remarks());
     Ok(report)
+}
+
+fn unknown_folder(path: &Path) -> InputError {
+    let cause = "this folder is no run, no sweep, no bag and no MRCLAM data set";
+    InputError::new(path.display(), cause, "give such a folder, or the files in this one")
 }
 
 fn unknown_kind(path: &Path) -> InputError {
@@ -145,14 +154,15 @@ fn run_report(path: &Path) -> Result<ImportReport, InputError> {
     if manifest.ends_in_flight() && manifest.status != Status::Complete {
         let end = cut_off_text(manifest.cycles_done, manifest.cycles_planned);
         let text = if manifest.is_cut_off { end } else { UNCLOSED_FLIGHT.to_string() };
-        let remedy = "close its recording with `sidestep resume`, if its server is gone";
-        report.record(Treatment::Noted, text, "", if manifest.is_cut_off { "" } else { remedy });
+        let resume = sidestep_command("resume", path);
+        let remedy = format!("close its recording with `{resume}`, if its server is gone");
+        report.record(Treatment::Noted, text, "", if manifest.is_cut_off { "" } else { &remedy });
     } else if manifest.status != Status::Complete {
         report.record(
             Treatment::Noted,
             "the run has not ended: its tables reach to its last checkpoint",
             "",
-            "continue it with `sidestep resume`",
+            &format!("continue it with `{}`", sidestep_command("resume", path)),
         );
     }
     Ok(report)
@@ -173,7 +183,7 @@ fn sweep_report(path: &Path) -> Result<ImportReport, InputError> {
             Treatment::Noted,
             "the sweep is not done",
             "",
-            "continue it with `sidestep resume`",
+            &format!("continue it with `{}`", sidestep_command("resume", path)),
         );
     }
     Ok(report)
@@ -241,8 +251,16 @@ pub fn write_clean(
 }
 
 fn not_written(path: &Path) -> Error {
-    let cause = "a file of this kind is not written anew";
-    let remedy = "leave --clean out; it is for tracks, CARMEN logs, bags and maps with the size of their pixels";
+    if path.is_dir() {
+        let cause = "--clean writes what was kept of a file to a new one, and takes nothing out of a folder";
+        let verify = sidestep_command("verify", path);
+        let remedy =
+            format!("leave --clean out; `{verify}` lists files in the folder that are not its own");
+        return InputError::new(path.display(), cause, remedy).into();
+    }
+    let cause = "--clean writes no file of this kind";
+    let remedy = "leave it out; it writes recorded traffic (as CSV), CARMEN logs, bags (as MCAP), and maps whose file says \
+                  how large a box or pixel is (as YAML and PGM)";
     InputError::new(path.display(), cause, remedy).into()
 }
 

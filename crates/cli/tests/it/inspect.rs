@@ -1,6 +1,6 @@
 //! `sidestep inspect`: what a file is, and what becomes of it when it is read.
 
-use crate::support::{SCENARIO, TestFolder};
+use crate::support::{SCENARIO, TestFolder, signal, wait_for};
 
 const MAP: &str = "type octile\nheight 2\nwidth 3\nmap\n.@S\n...\n";
 
@@ -71,5 +71,32 @@ fn a_clean_map_is_written_for_one_file_at_a_time() {
     assert_eq!(two.code(), 2);
     assert!(two.err().contains("clean one file at a time"), "{}", two.err());
     place.write("s.toml", SCENARIO);
-    assert_eq!(place.run(&["inspect", "s.toml", "--clean", "b.toml"]).code(), 2);
+    let told = place.run(&["inspect", "s.toml", "--clean", "b.toml"]);
+    assert_eq!(told.code(), 2);
+    assert!(told.err().contains("s.toml: --clean writes no file of this kind"), "{}", told.err());
+}
+
+#[test]
+fn a_folder_is_not_cleaned_and_one_of_no_kind_is_told_apart_from_a_file() {
+    let place = TestFolder::new();
+    let child = place.start(&["run", "s.toml", "--out", "a run", "--cycles", "1000000000"]);
+    wait_for("a checkpoint", || place.path("a run/checkpoint.bin").exists());
+    signal(&child, "INT");
+    child.wait_with_output().expect("ended");
+    place.write("a run/notes.txt", "mine");
+    let told = place.run(&["inspect", "a run", "--clean", "clean"]);
+    assert_eq!(told.code(), 2);
+    assert!(told.out().contains("continue it with `sidestep resume 'a run'`"), "{}", told.out());
+    let advised =
+        "takes nothing out of a folder\n  help: leave --clean out; `sidestep verify 'a run'` lists";
+    assert!(told.err().contains(advised), "{}", told.err());
+    let listed = place.run(&["verify", "a run"]);
+    assert!(listed.out().contains("notes.txt"), "{}{}", listed.out(), listed.err());
+    std::fs::create_dir(place.path("empty")).expect("made");
+    for clean in [&[][..], &["--clean", "clean"]] {
+        let told = place.run(&[&["inspect", "empty"], clean].concat());
+        assert_eq!(told.code(), 2);
+        assert!(told.err().contains("empty: this folder is no run"), "{}", told.err());
+    }
+    assert!(!place.path("clean").exists());
 }
