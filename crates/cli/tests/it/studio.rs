@@ -319,6 +319,41 @@ fn only_its_own_page_may_ask() {
 }
 
 #[test]
+fn a_body_that_comes_byte_by_byte_holds_no_place() {
+    let place = TestFolder::new();
+    let studio = Studio::start(&place, &["--addr", "0.0.0.0"]);
+    let host = studio.host();
+    let begun = Instant::now();
+    let length = "Content-Length: 200";
+    let chunked = "Transfer-Encoding: chunked";
+    std::thread::scope(|scope| {
+        for (method, path, body) in [
+            ("POST", "/enter", length),
+            ("POST", "/enter", chunked),
+            ("GET", "/enter", length),
+            ("POST", "/report", length),
+            ("POST", "/export?path=s.toml&as=svg", chunked),
+            ("POST", "/socket", length),
+            ("POST", "/", length),
+            ("GET", "/", chunked),
+            ("PUT", "/nowhere", length),
+        ] {
+            let mut stream = studio.connect();
+            let head = format!("{method} {path} HTTP/1.1\r\nHost: {host}\r\n{body}\r\n\r\n");
+            stream.write_all(head.as_bytes()).expect("sent");
+            scope.spawn(move || {
+                // A write fails once the connection is ended.
+                let bytes = if body == chunked { "1\r\nx\r\n" } else { "x" };
+                while stream.write_all(bytes.as_bytes()).is_ok() {
+                    assert!(begun.elapsed() < Duration::from_secs(40), "{method} {path} is held");
+                    std::thread::sleep(Duration::from_millis(500));
+                }
+            });
+        }
+    });
+}
+
+#[test]
 fn a_studio_that_others_can_reach_asks_for_its_token() {
     let place = TestFolder::new();
     let studio = Studio::start(&place, &["--addr", "0.0.0.0"]);
