@@ -362,7 +362,7 @@ mod tests {
             &folder.path().join("out"),
             &ImportOptions::default(),
         );
-        assert!(error.expect_err("no kind").to_string().contains("not written anew"));
+        assert!(error.expect_err("no kind").to_string().contains("--clean writes no file"));
     }
 
     #[test]
