@@ -6,6 +6,10 @@ use std::path::{Path, PathBuf};
 
 use sidestep_kernel::ports::RecordError;
 
+/// The name of a file by which a folder that is being filled is known; the process that fills it has it locked. It is
+/// hidden, so that no file of a scenario or an export has it.
+pub(crate) const MARKER: &str = ".sidestep-unfinished";
+
 /// Returns the name of a file or folder while it is incomplete: `NAME.partial`.
 pub(crate) fn partial_path(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
@@ -62,7 +66,6 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
 /// Syncs file by file: other systems have no call for all.
 #[cfg(not(target_os = "linux"))]
 fn sync_tree(folder: &Path) -> io::Result<()> {
-    use crate::leftovers::MARKER;
     use std::ffi::OsStr;
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();

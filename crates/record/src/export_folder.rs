@@ -7,10 +7,9 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
 use crate::create_error::{CreateError, PathError};
-use crate::disk;
+use crate::disk::{self, MARKER};
 use crate::file_manifest::{EXPORT, FileManifest};
 use crate::if_exists::IfExists;
-use crate::leftovers::MARKER;
 use crate::replacement::Replacement;
 use crate::run_content::{list_tree, slashed};
 use crate::staging::StagingFolder;

@@ -5,15 +5,12 @@
 //! id and no lock is a leftover. Anything else with such a name is somebody's own.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::disk;
+use crate::disk::{self, MARKER};
 use crate::process_lock::{ProcessLock, is_locked};
 use crate::run_content::list_tree;
-use crate::staging::{hidden_prefix, remove_empty, remove_known};
-
-/// The name of the marker. It is hidden, so that no file of a scenario or an export has it.
-pub(crate) const MARKER: &str = ".sidestep-unfinished";
 
 /// Most bytes of a marker: more than a process id is nothing that a lock has written.
 const MAX_MARKER_BYTES: u64 = 20;
@@ -69,10 +66,46 @@ fn names_process(marker: &Path) -> bool {
     is_short && fs::read(marker).is_ok_and(|text| text.iter().all(u8::is_ascii_digit))
 }
 
+/// Returns how the hidden names of folders begin that take a place, or made room for one there; a process id follows.
+pub(crate) fn hidden_prefix(target: &Path, role: &str) -> Option<String> {
+    Some(format!(".{}.{role}-", target.file_name()?.display()))
+}
+
+/// Deletes the given files of a folder, and the folders that are empty then. A file that came meanwhile stays, and with it
+/// its folder.
+pub(crate) fn remove_known<'a>(
+    folder: &Path,
+    known: impl Iterator<Item = &'a PathBuf>,
+) -> io::Result<()> {
+    for path in known {
+        let path = folder.join(path);
+        let removed = if path.is_dir() && !path.is_symlink() {
+            fs::remove_dir(&path)
+        } else {
+            fs::remove_file(&path)
+        };
+        match removed {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {}
+            other => other?,
+        }
+    }
+    remove_empty(folder);
+    Ok(())
+}
+
+/// Removes a folder if there is no file below it.
+fn remove_empty(folder: &Path) {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_type().is_ok_and(|ty| ty.is_dir())) {
+        remove_empty(&entry.path());
+    }
+    // Fails, as it should, if the folder is not empty.
+    let _ = fs::remove_dir(folder);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::staging::StagingFolder;
 
     /// Makes a folder with a marker, as a process leaves it that ends in some way.
     fn make(place: &Path, name: &str, marker: Option<&str>) -> PathBuf {
@@ -122,27 +155,5 @@ mod tests {
         std::os::unix::fs::symlink(&other, left.join("link")).unwrap();
         assert_eq!(remove_leftovers(&place.path().join("x")), [left]);
         assert!(other.join("deep/er/a.csv").is_file() && other.join(MARKER).is_file());
-    }
-
-    #[test]
-    fn a_folder_that_this_process_fills_stays_and_keeps_its_lock() {
-        let place = tempfile::tempdir().unwrap();
-        let target = place.path().join("x");
-        let first = StagingFolder::new(&target).unwrap();
-        let second = StagingFolder::new(&target).unwrap();
-        assert!(first.leftovers().is_empty() && second.leftovers().is_empty());
-        let count = || fs::read_dir(place.path()).unwrap().count();
-        assert_eq!(count(), 2);
-        #[cfg(target_os = "linux")]
-        for entry in fs::read_dir(place.path()).unwrap() {
-            use std::os::unix::fs::MetadataExt;
-            // The system's lock, not the list of this process: to open the marker would have released it.
-            let marker = fs::metadata(entry.unwrap().path().join(MARKER)).unwrap();
-            let locks = fs::read_to_string("/proc/locks").unwrap_or_default();
-            assert!(locks.is_empty() || locks.contains(&format!(":{} ", marker.ino())), "{locks}");
-        }
-        drop(first);
-        drop(second);
-        assert_eq!(count(), 0);
     }
 }

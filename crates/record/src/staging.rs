@@ -8,8 +8,8 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 
 use crate::create_error::{CREATE_REMEDY, CreateError, PathError};
-use crate::disk;
-use crate::leftovers::{MARKER, remove_leftovers};
+use crate::disk::{self, MARKER};
+use crate::leftovers::{hidden_prefix, remove_known, remove_leftovers};
 use crate::process_lock::ProcessLock;
 use crate::replacement::Replacement;
 use crate::run_content::list_tree;
@@ -141,38 +141,6 @@ fn move_file(from: &Path, to: &Path) -> io::Result<()> {
     fs::rename(from, to)
 }
 
-/// Deletes the given files of a folder, and the folders that are empty then. A file that came meanwhile stays, and with it
-/// its folder.
-pub(crate) fn remove_known<'a>(
-    folder: &Path,
-    known: impl Iterator<Item = &'a PathBuf>,
-) -> io::Result<()> {
-    for path in known {
-        let path = folder.join(path);
-        let removed = if path.is_dir() && !path.is_symlink() {
-            fs::remove_dir(&path)
-        } else {
-            fs::remove_file(&path)
-        };
-        match removed {
-            Err(e) if e.kind() == io::ErrorKind::NotFound => {}
-            other => other?,
-        }
-    }
-    remove_empty(folder);
-    Ok(())
-}
-
-/// Removes a folder if there is no file below it.
-pub(crate) fn remove_empty(folder: &Path) {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    for entry in entries.filter(|entry| entry.file_type().is_ok_and(|ty| ty.is_dir())) {
-        remove_empty(&entry.path());
-    }
-    // Fails, as it should, if the folder is not empty.
-    let _ = fs::remove_dir(folder);
-}
-
 impl Drop for StagingFolder {
     fn drop(&mut self) {
         self.remove_marker();
@@ -202,11 +170,6 @@ pub fn resolve_link(target: &Path) -> io::Result<PathBuf> {
         .map_err(|e| io::Error::new(e.kind(), format!("a link to what is not there ({e})")))
 }
 
-/// Returns how the hidden names of folders begin that take a place, or made room for one there; a process id follows.
-pub(crate) fn hidden_prefix(target: &Path, role: &str) -> Option<String> {
-    Some(format!(".{}.{role}-", target.file_name()?.display()))
-}
-
 /// Returns a hidden name in the same folder that nothing has.
 fn hidden_sibling(target: &Path, role: &str) -> Result<PathBuf, InputError> {
     let cannot_create = |target: &Path, cause: &str| {
@@ -221,4 +184,31 @@ fn hidden_sibling(target: &Path, role: &str) -> Result<PathBuf, InputError> {
     let mut paths = names.map(|name| folder.join(name));
     let free = paths.find(|path| path.symlink_metadata().is_err());
     free.ok_or_else(|| cannot_create(target, "no name is free beside it"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_that_this_process_fills_stays_and_keeps_its_lock() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("x");
+        let first = StagingFolder::new(&target).unwrap();
+        let second = StagingFolder::new(&target).unwrap();
+        assert!(first.leftovers().is_empty() && second.leftovers().is_empty());
+        let count = || fs::read_dir(place.path()).unwrap().count();
+        assert_eq!(count(), 2);
+        #[cfg(target_os = "linux")]
+        for entry in fs::read_dir(place.path()).unwrap() {
+            use std::os::unix::fs::MetadataExt;
+            // The system's lock, not the list of this process: to open the marker would have released it.
+            let marker = fs::metadata(entry.unwrap().path().join(MARKER)).unwrap();
+            let locks = fs::read_to_string("/proc/locks").unwrap_or_default();
+            assert!(locks.is_empty() || locks.contains(&format!(":{} ", marker.ino())), "{locks}");
+        }
+        drop(first);
+        drop(second);
+        assert_eq!(count(), 0);
+    }
 }

@@ -383,7 +383,7 @@ fn recording_is_read_only(place: &str) -> Problem {
     Problem::new(place, "a recording is computed again as it was", remedy)
 }
 
-/// The page has no option --out, which the command's remedy names.
+/// The remedy of what cannot be stored: the page has no option --out, which that of the command names.
 const STORAGE_REMEDY: &str = "check the file, and the space on the disk";
 
 /// Converts an error of a session.
