@@ -42,11 +42,16 @@ pub(crate) fn split_endpoints(arguments: &[PathBuf]) -> (Vec<PathBuf>, Vec<Strin
 ///
 /// # Errors
 /// When the program that carries the network is not there, or the fleet does not answer.
-pub(crate) fn start_watching(endpoint: &str, tls: Option<Tls>) -> Result<Arc<FleetFeed>, Failure> {
+pub(crate) fn start_watching(
+    endpoint: &str,
+    tls: Option<Tls>,
+    is_insecure: bool,
+) -> Result<Arc<FleetFeed>, Failure> {
     let job = Job::Watch(WatchJob {
         build: worlds().build().into(),
         connect: vec![endpoint.to_string()],
         tls,
+        is_insecure,
         patience_s: FLEET_TIMEOUT_S,
     });
     let (first_sender, first) = channel();

@@ -138,6 +138,8 @@ pub struct WatchJob {
     pub connect: Vec<String>,
     /// Certificates, where links are encrypted.
     pub tls: Option<Tls>,
+    /// Whether links without certificates may leave this machine.
+    pub is_insecure: bool,
     /// Time in seconds that it waits for the server; after a silence of this length the server counts as gone.
     pub patience_s: f64,
 }

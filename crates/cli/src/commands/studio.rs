@@ -25,6 +25,8 @@ Examples:
   sidestep studio --addr 0.0.0.0           for others, who need its token
   sidestep studio office.toml --foxglove 127.0.0.1:8765
   sidestep studio tcp/127.0.0.1:7600       watch the fleet that flies there
+  sidestep studio tcp/10.0.0.1:7600 --insecure
+                                           one on another machine, on a network that you trust
 
 The page may read what lies below the given folders, the folders of the given \
 files, or else the current folder. It writes what you save there, and nothing else. Ctrl-C ends it.";
@@ -65,6 +67,10 @@ pub(crate) struct StudioArgs {
     #[command(flatten)]
     workers: WorkersArg,
 
+    /// Watch fleets on other machines without certificates: whoever is on the way can read and change what is shown
+    #[arg(long, conflicts_with = "tls_ca", help_heading = "Encryption")]
+    insecure: bool,
+
     #[command(flatten)]
     tls: TlsArgs,
 }
@@ -79,7 +85,7 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
     let (targets, fleets) = fleet_watch::split_endpoints(&args.targets);
     let mut watched = Vec::new();
     for endpoint in &fleets {
-        watched.push(fleet_watch::start_watching(endpoint, args.tls.files())?);
+        watched.push(fleet_watch::start_watching(endpoint, args.tls.files(), args.insecure)?);
     }
     let studio = StudioServer::start(ServerOptions {
         worlds: worlds().clone(),

@@ -30,13 +30,7 @@ pub(super) fn check_encryption<'a>(
     common: &CommonSettings,
 ) -> Result<(), InputError> {
     let tls = common.tls.as_ref();
-    tls.map_or(Ok(()), check_certificates)?;
-    for endpoint in endpoints {
-        check_endpoint_encryption(endpoint, tls)?;
-        if tls.is_none() && !common.is_insecure {
-            check_is_of_this_machine(endpoint)?;
-        }
-    }
+    check_links(endpoints, tls, common.is_insecure)?;
     if let Some(address) = &common.metrics
         && tls.is_none()
         && !common.is_insecure
@@ -46,14 +40,31 @@ pub(super) fn check_encryption<'a>(
     Ok(())
 }
 
-/// Checks the endpoint of a viewer, which only asks for pictures.
+/// Checks the endpoints of a viewer by the same rule.
 ///
 /// # Errors
 /// With the first thing that is wrong.
 pub(super) fn check_viewer_encryption(job: &WatchJob) -> Result<(), InputError> {
-    let tls = job.tls.as_ref();
+    check_links(&job.connect, job.tls.as_ref(), job.is_insecure)
+}
+
+/// Checks certificates, and endpoints by them.
+///
+/// # Errors
+/// With the first thing that is wrong.
+fn check_links<'a>(
+    endpoints: impl IntoIterator<Item = &'a String>,
+    tls: Option<&Tls>,
+    is_insecure: bool,
+) -> Result<(), InputError> {
     tls.map_or(Ok(()), check_certificates)?;
-    job.connect.iter().try_for_each(|endpoint| check_endpoint_encryption(endpoint, tls))
+    for endpoint in endpoints {
+        check_endpoint_encryption(endpoint, tls)?;
+        if tls.is_none() && !is_insecure {
+            check_is_of_this_machine(endpoint)?;
+        }
+    }
+    Ok(())
 }
 
 /// Checks that a party may be who it is to be by its certificate.

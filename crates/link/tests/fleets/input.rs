@@ -2,9 +2,10 @@
 
 use crate::processes::{LinkProcess, folder, job};
 use crate::support::{run_in_one_process, superconflict};
+use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
     AgentName, ClockMode, CommonSettings, FleetJob, Job, JobScenario, LinkMessage, NodeJob,
-    Topology,
+    Topology, WatchJob,
 };
 use std::net::TcpListener;
 use std::path::Path;
@@ -70,6 +71,34 @@ fn a_fleet_that_cannot_be_flown_is_refused_before_anything_is_started() {
     std::fs::create_dir(&out).expect("made");
     std::fs::write(out.join("something"), "").expect("written");
     assert!(refused(&Job::Fleet(right)).contains("run"));
+}
+
+/// By the rule of nodes: the way of the pictures is as open to others as that of controls.
+#[test]
+fn a_viewer_leaves_its_machine_without_certificates_only_where_the_network_is_said_to_be_trusted() {
+    let job = |endpoint: &str, is_insecure| {
+        Job::Watch(WatchJob {
+            build: WORLDS.build().into(),
+            connect: vec!["tcp/127.0.0.1:9".into(), endpoint.into()],
+            tls: None,
+            is_insecure,
+            patience_s: 0.5,
+        })
+    };
+    for elsewhere in ["tcp/192.0.2.1:9", "tcp/[2001:db8::1]:9", "tcp/fleet.example:9"] {
+        let said = refused(&job(elsewhere, false));
+        assert!(
+            said.starts_with(&format!("{elsewhere}: it is not of this machine alone")),
+            "{said}"
+        );
+        assert!(said.contains("or, on a network that you trust, --insecure"), "{said}");
+    }
+    for (here, is_insecure) in [("tcp/localhost:9", false), ("tcp/127.0.0.2:9", true)] {
+        let (code, failed) = LinkProcess::start(&job(here, is_insecure)).end();
+        let failed = failed.expect("it says why");
+        assert!(failed.cause.contains("no answer from"), "{failed:?}");
+        assert_eq!(code, Some(1), "{failed:?}");
+    }
 }
 
 /// One airplane is flown here, and the other one is awaited.
