@@ -8,6 +8,7 @@ use crate::wire::endpoint::parse_port;
 use crate::wire::http_text::serve_http_text;
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::{AgentName, FleetStatus, NodeStatus};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -93,6 +94,7 @@ pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetContext<'_>) -> S
     text.push_sample("frames_total", "", fleet.messenger.stats().frames);
     text.push_header("frame_bytes_total", "counter", "Bytes of frames that the server has sent.");
     text.push_sample("frame_bytes_total", "", fleet.messenger.stats().bytes);
+    push_dropped_frames(&mut text, &fleet.messenger.stats().dropped);
     text.push_header(
         "denied_total",
         "counter",
@@ -101,6 +103,14 @@ pub(super) fn fleet_metrics(status: &FleetStatus, fleet: &FleetContext<'_>) -> S
     text.push_sample("denied_total", "", denied_total());
     push_node_metrics(&mut text, status, fleet);
     text.0
+}
+
+fn push_dropped_frames(text: &mut MetricsText, dropped: &BTreeMap<&'static str, u64>) {
+    let help = "Frames that the server has dropped, by reason.";
+    text.push_header("frames_dropped_total", "counter", help);
+    for (reason, count) in dropped {
+        text.push_sample("frames_dropped_total", &format_label("reason", reason), count);
+    }
 }
 
 fn push_cycle_times(text: &mut MetricsText, metrics: &ServerMetrics) {

@@ -13,13 +13,13 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// Returns free addresses of this machine; no two are the same, because all are held at once.
-fn free_addresses<const N: usize>() -> [String; N] {
+pub(crate) fn free_addresses<const N: usize>() -> [String; N] {
     let held = [(); N].map(|()| reserve_port("tcp/127.0.0.1:0").expect("a free port"));
     held.map(|held| held.endpoint.trim_start_matches("tcp/").to_string())
 }
 
 /// Asks an address by HTTP, and returns the first line of the answer, and its body.
-fn ask(address: &str, method: &str) -> (String, String) {
+pub(crate) fn ask(address: &str, method: &str) -> (String, String) {
     let mut stream = TcpStream::connect(address).expect("somebody answers");
     write!(stream, "{method} /metrics HTTP/1.1\r\nHost: {address}\r\n\r\n").expect("asked");
     let mut answer = String::new();
@@ -32,14 +32,14 @@ fn ask(address: &str, method: &str) -> (String, String) {
 
 /// A family of metrics: its type, and its values by name with labels.
 #[derive(Debug, Default)]
-struct Family {
+pub(crate) struct Family {
     kind: String,
     values: Vec<(String, BTreeMap<String, String>, f64)>,
 }
 
 impl Family {
     /// Returns the value with these labels.
-    fn value(&self, labels: &[(&str, &str)]) -> Option<f64> {
+    pub(crate) fn value(&self, labels: &[(&str, &str)]) -> Option<f64> {
         let is_it = |own: &BTreeMap<String, String>| {
             own.len() == labels.len()
                 && labels.iter().all(|(key, value)| own.get(*key).is_some_and(|own| own == value))
@@ -70,7 +70,7 @@ fn value_of(line: &str) -> (String, BTreeMap<String, String>, f64) {
 }
 
 /// Reads Prometheus' text, line by line, by its format (0.0.4).
-fn families(text: &str) -> BTreeMap<String, Family> {
+pub(crate) fn families(text: &str) -> BTreeMap<String, Family> {
     let mut families: BTreeMap<String, Family> = BTreeMap::new();
     let mut present = String::new();
     assert!(text.ends_with('\n'), "the last line is whole");
@@ -145,8 +145,8 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
     assert_eq!(status, "HTTP/1.1 200 OK");
     let server_tells = families(&text);
     let names = "cycle talk_seconds advance_seconds late_seconds late_cycles_total absurd_controls_total \
-         refused_total denied_total frames_total frame_bytes_total node_up controls_flown_total controls_late_total \
-         node_lives_total";
+         refused_total denied_total frames_total frame_bytes_total frames_dropped_total node_up controls_flown_total \
+         controls_late_total node_lives_total";
     let all = |names: &[&str]| -> BTreeSet<String> {
         names.iter().chain(&COMMON).map(|name| format!("sidestep_{name}")).collect()
     };
