@@ -2,7 +2,7 @@
 
 use super::certificates::{check_identity, credentials, with_signatures};
 use super::children::NodeProcesses;
-use super::log::report_denials;
+use super::denials::DenialLog;
 use super::metrics::{MetricsExporter, fleet_metrics};
 use super::node::endpoint_error;
 use super::output::print_message;
@@ -93,6 +93,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let children = NodeProcesses::start(jobs, restarts)?;
     let run_config = run.simulation().config();
     let mut supervisor = FleetSupervisor::new(children, parent, run_config.cycles, exporter, views);
+    supervisor.denials = DenialLog::new(credentials.as_ref());
     supervisor.packets = create_packet_table(job, &scenario.source.text, run_config.seed)?;
     let mut run = HostedRun::new(run, scenario.world, &WarningLogger);
     let (result, _) = FleetServer::new(messenger, &mut run, &mut supervisor, config).run();
@@ -234,6 +235,7 @@ struct FleetSupervisor<'a> {
     cycles: Cycle,
     exporter: MetricsExporter,
     views: ViewPublisher,
+    denials: DenialLog,
     report_at: Instant,
     /// Time at which all nodes had joined.
     begun_at: Option<Instant>,
@@ -263,6 +265,7 @@ impl<'a> FleetSupervisor<'a> {
             cycles,
             exporter,
             views,
+            denials: DenialLog::default(),
             report_at: now,
             begun_at: None,
             status: FleetStatus { cycles, ..FleetStatus::default() },
@@ -370,7 +373,7 @@ impl ServerHooks for FleetSupervisor<'_> {
         }
         if Instant::now() >= self.report_at {
             self.report_at = Instant::now() + REPORT_INTERVAL;
-            report_denials();
+            self.denials.report();
             self.report(fleet);
         }
         let ended = self.children.poll_and_restart(|agent| {
@@ -396,6 +399,7 @@ impl ServerHooks for FleetSupervisor<'_> {
     }
 
     fn on_end(&mut self, fleet: &FleetContext<'_>) {
+        self.denials.report();
         self.update_status(fleet);
         self.views.publish_view(&self.status, true);
     }

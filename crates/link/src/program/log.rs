@@ -1,7 +1,8 @@
 //! Logs to standard error, one line each, as text or as JSON.
 
-use crate::wire::access::{ACCESS_TARGET, DenialLayer, Denials, take_denials};
+use crate::wire::access::{ACCESS_TARGET, DenialLayer};
 use crate::wire::endpoint::without_sources;
+use crate::wire::link_log::{FILE_LIMIT_HINT, LINK_TARGET, LinkLayer};
 use sidestep::kernel::InputError;
 use std::io::{self, Write};
 use tracing::level_filters::LevelFilter;
@@ -21,16 +22,19 @@ pub(super) fn start(is_json: bool, level: &str, is_encrypted: bool) -> Result<()
     let mut targets = Targets::new().with_target("sidestep_link", level_filter);
     targets = match level_filter {
         LevelFilter::TRACE => targets.with_default(level_filter),
-        // Zenoh warns of its scouting, which is off; it reports problems with certificates nowhere else.
+        // Zenoh warns of its scouting, which is off. Its problems with certificates are told by `denials.rs`.
         _ => targets
             .with_default(level_filter.min(LevelFilter::ERROR))
-            .with_target("zenoh_link_tls", level_filter.min(LevelFilter::WARN)),
+            .with_target(LINK_TARGET, LevelFilter::OFF),
     };
     let lines = fmt::layer().with_writer(|| CleanStderr).with_ansi(false).with_target(false);
     let denials = is_encrypted.then(|| {
         DenialLayer.with_filter(Targets::new().with_target(ACCESS_TARGET, LevelFilter::TRACE))
     });
-    let registry = tracing_subscriber::registry().with(denials);
+    let links = is_encrypted.then(|| {
+        LinkLayer.with_filter(Targets::new().with_target(LINK_TARGET, LevelFilter::DEBUG))
+    });
+    let registry = tracing_subscriber::registry().with(denials).with(links);
     let started = if is_json {
         registry.with(lines.json().flatten_event(true).with_filter(targets)).try_init()
     } else {
@@ -40,20 +44,6 @@ pub(super) fn start(is_json: bool, level: &str, is_encrypted: bool) -> Result<()
     drop(started);
     Ok(())
 }
-
-/// Logs what access control has denied since the last call.
-pub(super) fn report_denials() {
-    if let Some(Denials { count, last }) = take_denials() {
-        tracing::warn!(
-            count,
-            last,
-            "messages are denied: a party does what its certificate does not allow"
-        );
-    }
-}
-
-/// What Zenoh advises whenever a link cannot be accepted, whatever the reason.
-const FILE_LIMIT_HINT: &str = "Hint: increase the system open file limit.";
 
 /// What is said instead, unless files are the reason.
 const REFUSED_LINK: &str = "A link was not opened: see the certificates of both ends.";

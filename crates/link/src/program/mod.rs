@@ -5,7 +5,7 @@
 //! node.rs            one node
 //! watch.rs           a viewer of a fleet; view.rs: the views at the server
 //! scenario.rs        the scenario that server and nodes read
-//! certificates.rs    checks of certificates
+//! certificates.rs    checks of certificates; denials.rs: what they do not allow, for the log
 //! one_thread.rs      the one thread of the network that encrypted links need
 //! output.rs          lines for the parent process; parent_monitor.rs: the end of that process
 //! log.rs             logs to standard error
@@ -15,6 +15,7 @@
 
 mod certificates;
 mod children;
+mod denials;
 mod fleet;
 mod log;
 mod metrics;

@@ -1,7 +1,7 @@
 //! A node as a process.
 
 use super::certificates::{check_identity, check_names, credentials, with_signatures};
-use super::log::report_denials;
+use super::denials::DenialLog;
 use super::metrics::{MetricsExporter, node_metrics};
 use super::parent_monitor::ParentMonitor;
 use super::scenario::Scenario;
@@ -74,10 +74,11 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
     let name = job.agent.clone();
     tracing::info!(agent, who = format!("{} {name}", name.noun), "joined");
     let interrupt = monitor.clone();
+    let mut denials = DenialLog::new(credentials.as_ref());
     let node = Node::new(agent, seat, program, channel, &welcome)
         .with_server_timeout(Duration::from_secs_f64(job.common.lease_s))
         .with_status_listener(move |status| {
-            report_denials();
+            denials.report();
             exporter.replace_text(|| node_metrics(&name, status));
         })
         .with_interrupt(move || interrupt.has_ended());

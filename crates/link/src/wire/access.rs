@@ -310,8 +310,9 @@ impl Preview {
     }
 }
 
+/// The message of an event of a log.
 #[derive(Default)]
-struct MessageText(String);
+pub(super) struct MessageText(pub(super) String);
 
 impl Visit for MessageText {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {

@@ -8,7 +8,7 @@
 //! memory.rs       between threads
 //! access.rs       who may publish and subscribe what, by certificates
 //! endpoint.rs     notation of endpoints, and reserved ports
-//! handshake.rs    the reason why a certificate is rejected
+//! handshake.rs    the reason why a certificate is rejected; link_log.rs: what Zenoh says of encrypted links
 //! view_server.rs  views of a fleet for its viewers, by query and reply
 //! http_text.rs    a text served by HTTP
 //! ```
@@ -17,6 +17,7 @@ pub mod access;
 pub mod endpoint;
 mod handshake;
 pub mod http_text;
+pub mod link_log;
 pub mod memory;
 mod multicast;
 pub mod view_server;

@@ -1,5 +1,6 @@
 //! Encrypted links, at which both ends prove their identity.
 
+use crate::attack::session;
 use crate::processes::{LinkProcess, folder, job};
 use crate::support::{run_in_one_process, superconflict, wide};
 use sidestep_link::wire::access::Credentials;
@@ -101,8 +102,11 @@ fn with_certificates_a_fleet_flies_as_ever_and_whoever_has_none_of_its_authority
         assert!(failed.cause.contains(cause) && !failed.remedy.is_empty(), "{failed:?}");
         assert!(failed.place.starts_with(place), "{failed:?}");
     }
-    // Zenoh's words, because it alone sees the certificate.
-    let says = |line: &String| line.contains("UnknownCA");
+    // With Zenoh's words, because it alone sees the certificate.
+    let says = |line: &String| {
+        line.contains("UnknownCA")
+            && line.contains("give the other end the authority of this party")
+    };
     let until = Instant::now() + Duration::from_secs(60);
     while !server.logged().iter().any(says) {
         assert!(Instant::now() < until, "{:?}", server.logged());
@@ -224,4 +228,43 @@ fn a_certificate_that_is_out_of_date_is_refused_by_the_server_which_says_so() {
         other => panic!("{other:?}"),
     }
     node(&ours).expect("with one that holds it gets in");
+}
+
+/// Whose certificate is for nobody is let in by Zenoh, and denied everything; whose is out of date is not let in.
+#[test]
+fn the_server_says_whom_it_denies_everything_and_why_links_are_not_opened_and_what_would_be_right()
+{
+    let test = "tls::the_server_says_whom_it_denies_everything_and_why_links_are_not_opened_and_what_would_be_right";
+    if !is_process_with_one_thread(test) {
+        return;
+    }
+    let folder = folder(&superconflict(2, "compact-team", 10, ""));
+    let Some(ours) = authority(folder.path(), "ours", 2) else { return };
+    let Some(stranger) = certificate(folder.path(), "ours", "airplane-7", 2) else { return };
+    let Some(old) = certificate(folder.path(), "ours", "airplane-1", -1) else { return };
+    let mut job = FleetJob { nodes: Some(1), ..fleet(folder.path(), Some(ours)) };
+    job.common.log = "warn".into();
+    let server = LinkProcess::start(&Job::Fleet(job));
+    let connect = endpoints(&server);
+    server.fleet("the first node", |now| now.nodes[0].state == "joined");
+    let told = |words: &[&str]| {
+        let until = Instant::now() + Duration::from_secs(60);
+        let is_told = |line: &String| words.iter().all(|word| line.contains(word));
+        while !server.logged().iter().any(is_told) {
+            assert!(Instant::now() < until, "{words:?} in {:?}", server.logged());
+            server.fleet("a report", |_| true);
+        }
+    };
+    let guest = session("client", &connect, &stranger);
+    told(&["denied everything", "`airplane-7`", "`airplane-0` to `airplane-1`", "count=1"]);
+    for count in [1, 2] {
+        let own = Credentials { tls: old.clone(), agents: vec!["airplane-1".into()] };
+        let refused =
+            ZenohWire::node_wire(PeerId::Node(1), &connect, Some(&own), Duration::from_secs(30));
+        assert!(matches!(refused, Err(WireSetupError::Distrust { .. })));
+        told(&["links are not opened", "xpired", "renew it", &format!("count={count}")]);
+    }
+    drop(guest);
+    let names = server.logged().iter().filter(|line| line.contains("`airplane-7`")).count();
+    assert_eq!(names, 1, "{:?}", server.logged());
 }
