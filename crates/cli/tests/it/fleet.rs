@@ -189,6 +189,73 @@ fn a_fleet_that_the_studio_watches_is_seen_to_its_end_steered_by_nobody_and_has_
     assert_eq!(place.json(&["replay", "r"])["digest"], alone["digest"]);
 }
 
+/// Makes an authority, and a certificate for the server and for each of some airplanes, by the commands of the book;
+/// each node has only its own key, in a folder of its own. Returns whether it has.
+fn make_certificates(place: &TestFolder, airplanes: usize) -> bool {
+    let page = include_str!("../../../../docs/src/fleet-threats.md");
+    let block = page.split("```sh ignore\n").nth(1).and_then(|rest| rest.split("```").next());
+    let block = block.expect("the commands of the book").replace("10.77.0.1", "127.0.0.1");
+    let start = block.find("echo \"subjectAltName=IP:10.77.0.2").expect("a node");
+    let common = &block[..start];
+    let node = block[start..].replace("10.77.0.2", "127.0.0.1");
+    let mut script = format!("set -e\n{common}");
+    for airplane in 0..airplanes {
+        let name = format!("airplane-{airplane}");
+        script += &node.replace("airplane-0", &name).replace("node0", &format!("node{airplane}"));
+        script += &format!(
+            "mkdir m{airplane}\ncp ring.toml ca.pem m{airplane}\nmv node{airplane}.pem node{airplane}.key m{airplane}\n"
+        );
+    }
+    script += "rm ca.key\n";
+    let mut shell = std::process::Command::new("sh");
+    let made = shell.args(["-c", &script]).current_dir(place.path("")).output().expect("a shell");
+    if !made.status.success() {
+        requires("link", &format!("openssl makes no certificates: {made:?}"));
+    }
+    made.status.success()
+}
+
+#[test]
+fn a_fleet_in_which_each_node_has_its_own_certificate_has_the_digest_of_a_run() {
+    let place = place();
+    if !is_there() || !make_certificates(&place, 3) {
+        return;
+    }
+    let alone = place.json(&["run", "ring.toml"]);
+    for topology in ["mesh", "star"] {
+        let args = "fleet ring.toml --nodes 0 --listen tls/127.0.0.1:0 --tls-ca ca.pem --tls-cert server.pem --tls-key \
+                    server.key --topology";
+        let args: Vec<&str> =
+            args.split_whitespace().chain([topology, "--out", topology]).collect();
+        let mut fleet = place.start(&args);
+        let at = endpoint(&mut fleet);
+        let listen = if topology == "mesh" { "--listen tls/127.0.0.1:0" } else { "" };
+        // A key and the airplane for which it is used.
+        let words = |key: usize, airplane: usize| {
+            format!(
+                "node m{key}/ring.toml --airplane {airplane} --connect {at} {listen} --tls-ca m{key}/ca.pem \
+                 --tls-cert m{key}/node{key}.pem --tls-key m{key}/node{key}.key"
+            )
+        };
+        let other = words(1, 0);
+        let refused = place.run(&other.split_whitespace().collect::<Vec<_>>());
+        assert_eq!(refused.code(), 2, "{}", refused.err());
+        assert!(refused.err().contains("it is for `airplane-1`"), "{}", refused.err());
+        let mut nodes = Vec::new();
+        for airplane in 0..3 {
+            let own = words(airplane, airplane);
+            nodes.push(place.start(&own.split_whitespace().collect::<Vec<_>>()));
+        }
+        let ended = CommandOutput(fleet.wait_with_output().expect("it ends"));
+        assert_eq!(ended.code(), 0, "{}", ended.err());
+        for node in nodes {
+            let ended = CommandOutput(node.wait_with_output().expect("it ends"));
+            assert_eq!(ended.code(), 0, "{}", ended.err());
+        }
+        assert_eq!(place.json(&["replay", topology])["digest"], alone["digest"], "{topology}");
+    }
+}
+
 #[test]
 fn an_address_where_no_fleet_flies_is_refused_before_a_page_is_served() {
     let place = place();
@@ -203,6 +270,11 @@ fn an_address_where_no_fleet_flies_is_refused_before_a_page_is_served() {
     let ended = place.run(&["studio", "--no-open", "tcp/127.0.0.1:9"]);
     assert_eq!((ended.code(), ended.out()), (1, String::new()));
     assert!(ended.err().contains("no answer from tcp/127.0.0.1:9"), "{}", ended.err());
+    let elsewhere = place.run(&["studio", "--no-open", "tcp/192.0.2.1:9"]);
+    assert_eq!((elsewhere.code(), elsewhere.out()), (2, String::new()));
+    assert!(elsewhere.err().contains("tcp/192.0.2.1:9: it is not of this"), "{}", elsewhere.err());
+    let trusted = place.run(&["studio", "--no-open", "--insecure", "tcp/127.0.0.1:9"]);
+    assert_eq!(trusted.code(), 1, "{}", trusted.err());
 }
 
 /// Returns the cycles of a run that are on disk for certain.
