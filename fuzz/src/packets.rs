@@ -56,13 +56,14 @@ pub(crate) fn to_a_connector(mut data: &[u8]) {
 }
 
 /// Settings of airplanes that talk, with every kind of message.
-const TALKS: [&str; 7] = [
+const TALKS: [&str; 8] = [
     "deployment = \"team\"",
     "deployment = \"compact-team\"",
     "deployment = \"team\"\npreset = \"paper\"",
     "deployment = \"compact-team\"\npreset = \"paper\"",
     "deployment = \"pim\"",
     "deployment = \"team\"\nmethod = \"mvp\"",
+    "deployment = \"replica-team\"\nnetwork = { budget_bytes_s = 4000.0 }",
     "deployment = \"hierarchical-pim\"\npreset = \"paper\"\nnetwork = { loss = 0.1 }",
 ];
 
