@@ -1,12 +1,15 @@
 //! A multicast group of UDP: a frame to many nodes is sent once, and the network copies it.
 //!
-//! A datagram arrives whole or not at all, and a lost one stops no other: what must arrive is repeated above
+//! A frame to one node goes to it alone, as soon as it was heard. A datagram arrives whole or not at all, and a lost one stops no other: what must arrive is repeated above
 //! (`arq.rs`). There are no links that could break, and nothing here waits for another node.
 
+use super::PeerId;
 use super::endpoint::{WireSetupError, bare_host, endpoint_in_use, host_and_port};
+use crate::protocol::TransportFrame;
 use mio::net::UdpSocket;
 use mio::{Events, Interest, Poll, Token, Waker};
 use socket2::{Domain, Protocol, Socket, Type};
+use std::collections::BTreeMap;
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
 use std::io;
@@ -26,8 +29,9 @@ const RECEIVE_BUFFER_BYTES: usize = 1 << 20;
 /// Maximum number of routers between two nodes, which have to be told to forward multicast at all.
 const TIME_TO_LIVE: u32 = 8;
 
-const SOCKET: Token = Token(0);
-const WAKER: Token = Token(1);
+const GROUP_SOCKET: Token = Token(0);
+const OWN_SOCKET: Token = Token(1);
+const WAKER: Token = Token(2);
 
 /// Wakes a node that waits for datagrams when something else has arrived; none before it has a multicast group.
 pub(super) type SharedWaker = Arc<OnceLock<Waker>>;
@@ -37,10 +41,14 @@ pub(super) struct MulticastSocket {
     group: SocketAddrV4,
     poll: Poll,
     events: Events,
+    /// Receives what is sent to the group.
     receiver: UdpSocket,
-    sender: UdpSocket,
+    /// Sends, and receives what is for this node alone.
+    own: UdpSocket,
     /// The address from which this node sends: its own datagrams come back to it, too.
     own_address: SocketAddr,
+    /// The addresses from which other nodes were last heard.
+    addresses: BTreeMap<PeerId, SocketAddr>,
     buffer: Box<[u8]>,
 }
 
@@ -59,37 +67,60 @@ impl MulticastSocket {
         let interface = interface_toward(toward)?;
         let poll = Poll::new().map_err(taken)?;
         let mut receiver = open_receiver(group, interface).map_err(taken)?;
-        let sender = open_sender(interface).map_err(taken)?;
-        poll.registry().register(&mut receiver, SOCKET, Interest::READABLE).map_err(taken)?;
-        let own_address = sender.local_addr().map_err(taken)?;
+        let mut own = open_own(interface).map_err(taken)?;
+        let readable = Interest::READABLE;
+        poll.registry().register(&mut receiver, GROUP_SOCKET, readable).map_err(taken)?;
+        poll.registry().register(&mut own, OWN_SOCKET, readable).map_err(taken)?;
+        let own_address = own.local_addr().map_err(taken)?;
         let _ = waker.set(Waker::new(poll.registry(), WAKER).map_err(taken)?);
         let events = Events::with_capacity(4);
         let buffer = vec![0; MAX_DATAGRAM_BYTES].into();
-        Ok(Self { group, poll, events, receiver, sender, own_address, buffer })
+        let addresses = BTreeMap::new();
+        Ok(Self { group, poll, events, receiver, own, own_address, addresses, buffer })
     }
 
-    /// Sends a frame to all nodes of the group. One that the system does not take is lost, as in transit.
-    pub(super) fn send(&self, frame: &[u8]) {
-        let _ = self.sender.send_to(frame, self.group.into());
+    /// Sends a frame to nodes of the group. One that the system does not take is lost, as in transit.
+    pub(super) fn send(&self, to: &[PeerId], frame: &[u8]) {
+        // One that has restarted has another address, and tells it by what it sends first.
+        let address = match to {
+            [one] => self.addresses.get(one).copied(),
+            _ => None,
+        };
+        let _ = self.own.send_to(frame, address.unwrap_or(self.group.into()));
     }
 
-    /// Returns the next frame that has arrived from another node, if any.
-    pub(super) fn try_receive(&mut self) -> Option<Vec<u8>> {
-        loop {
-            match self.receiver.recv_from(&mut self.buffer) {
-                Ok((_, from)) if from == self.own_address => {}
-                Ok((length, _)) => return Some(self.buffer[..length].to_vec()),
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                // None is there, or the system reports that one of ours could not be delivered.
-                Err(_) => return None,
-            }
+    /// Returns the next frame that has arrived from another node, with the sender that it names, if any.
+    pub(super) fn try_receive(&mut self) -> Option<(Option<PeerId>, Vec<u8>)> {
+        let (frame, from) = receive_from(&self.own, self.own_address, &mut self.buffer)
+            .or_else(|| receive_from(&self.receiver, self.own_address, &mut self.buffer))?;
+        let sender = TransportFrame::sender(&frame);
+        if let Some(sender) = sender {
+            self.addresses.insert(sender, from);
         }
+        Some((sender, frame))
     }
 
     /// Waits until something arrives here, or its waker is used, and at most the given time.
     pub(super) fn wait(&mut self, within: Duration) {
         // An interrupt is like an arrival: the caller looks what there is.
         let _ = self.poll.poll(&mut self.events, Some(within));
+    }
+}
+
+/// Returns the next datagram of a socket that is not this node's own, and the address of its sender.
+fn receive_from(
+    socket: &UdpSocket,
+    own_address: SocketAddr,
+    buffer: &mut [u8],
+) -> Option<(Vec<u8>, SocketAddr)> {
+    loop {
+        match socket.recv_from(buffer) {
+            Ok((_, from)) if from == own_address => {}
+            Ok((length, from)) => return Some((buffer[..length].to_vec(), from)),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            // None is there, or the system reports that one of ours could not be delivered.
+            Err(_) => return None,
+        }
     }
 }
 
@@ -107,12 +138,13 @@ fn open_receiver(group: SocketAddrV4, interface: Ipv4Addr) -> io::Result<UdpSock
     Ok(UdpSocket::from_std(socket.into()))
 }
 
-fn open_sender(interface: Ipv4Addr) -> io::Result<UdpSocket> {
+fn open_own(interface: Ipv4Addr) -> io::Result<UdpSocket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
     socket.set_multicast_if_v4(&interface)?;
     socket.set_multicast_ttl_v4(TIME_TO_LIVE)?;
     // Nodes on the same machine hear it, too.
     socket.set_multicast_loop_v4(true)?;
+    let _ = socket.set_recv_buffer_size(RECEIVE_BUFFER_BYTES);
     socket.bind(&SocketAddrV4::new(interface, 0).into())?;
     socket.set_nonblocking(true)?;
     Ok(UdpSocket::from_std(socket.into()))
@@ -157,6 +189,7 @@ pub fn draw_group() -> SocketAddrV4 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::{Incarnation, Message};
     use std::time::Instant;
 
     const LOOPBACK: &str = "tcp/127.0.0.1:7600";
@@ -167,10 +200,13 @@ mod tests {
         joined.map_err(|error| sidestep_testing::skip(&error.to_string())).ok()
     }
 
+    /// The receivers of a frame for more than one.
+    const ALL: [PeerId; 2] = [PeerId::Node(0), PeerId::Node(1)];
+
     fn receive(socket: &mut MulticastSocket) -> Option<Vec<u8>> {
         let until = Instant::now() + Duration::from_secs(20);
         loop {
-            let frame = socket.try_receive();
+            let frame = socket.try_receive().map(|(_, frame)| frame);
             let left = until.saturating_duration_since(Instant::now());
             if frame.is_some() || left.is_zero() {
                 return frame;
@@ -185,8 +221,8 @@ mod tests {
         let join = || member(group, &SharedWaker::default());
         let (Some(mut a), Some(mut b), Some(mut c)) = (join(), join(), join()) else { return };
         let large = vec![7; MAX_DATAGRAM_BYTES];
-        a.send(&large);
-        b.send(&[8]);
+        a.send(&ALL, &large);
+        b.send(&ALL, &[8]);
         assert!(receive(&mut b) == Some(large.clone()), "of the greatest size");
         assert!(receive(&mut c) == Some(large));
         assert_eq!(receive(&mut c), Some(vec![8]));
@@ -201,9 +237,32 @@ mod tests {
         let (Some(mut a), Some(b), Some(stranger)) = (join(group), join(group), join(other)) else {
             return;
         };
-        stranger.send(&[1]);
-        b.send(&[2]);
+        stranger.send(&ALL, &[1]);
+        b.send(&ALL, &[2]);
         assert_eq!(receive(&mut a), Some(vec![2]));
+    }
+
+    /// A frame of a node to others.
+    fn frame_of(agent: u32, number: u64) -> Vec<u8> {
+        let from = PeerId::Node(agent);
+        let message = Some(Message::Heartbeat);
+        TransportFrame { from, incarnation: Incarnation(1), number, to: Vec::new(), message }
+            .encode()
+    }
+
+    #[test]
+    fn a_frame_to_one_node_that_was_heard_reaches_it_alone() {
+        let group = draw_group();
+        let join = || member(group, &SharedWaker::default());
+        let (Some(mut a), Some(mut b), Some(mut c)) = (join(), join(), join()) else { return };
+        let [hello, to_one, to_all] = [frame_of(2, 0), frame_of(1, 1), frame_of(1, 2)];
+        c.send(&ALL, &hello);
+        assert!(receive(&mut a) == Some(hello.clone()) && receive(&mut b) == Some(hello));
+        a.send(&[PeerId::Node(2)], &to_one);
+        a.send(&ALL, &to_all);
+        assert_eq!(receive(&mut b), Some(to_all.clone()), "what was for one does not come here");
+        let heard = [receive(&mut c), receive(&mut c)];
+        assert!(heard.contains(&Some(to_one)) && heard.contains(&Some(to_all)));
     }
 
     #[test]
@@ -214,7 +273,7 @@ mod tests {
         waker.get().expect("it is set").wake().expect("awake");
         socket.wait(Duration::from_secs(20));
         assert!(began.elapsed() < Duration::from_secs(10));
-        assert_eq!(socket.try_receive(), None);
+        assert!(socket.try_receive().is_none());
     }
 
     #[test]

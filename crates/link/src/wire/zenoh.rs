@@ -473,7 +473,7 @@ impl Wire for ZenohWire {
             // The server relays what is too large for a datagram.
             && frame.len() <= MAX_DATAGRAM_BYTES
         {
-            group.send(frame);
+            group.send(to, frame);
             return;
         }
         let link = match &mut self.mesh {
@@ -508,10 +508,10 @@ impl Wire for ZenohWire {
             if let Ok(frame) = self.frames.try_recv() {
                 return Some(frame);
             }
-            while let Some(frame) = group.try_receive() {
+            while let Some((sender, frame)) = group.try_receive() {
                 // Only a node sends to the group. Whoever names the server there would be believed: what that says is
                 // not signed, because it comes over a link with it.
-                if TransportFrame::sender(&frame) != Some(PeerId::Server) {
+                if sender != Some(PeerId::Server) {
                     return Some(frame);
                 }
                 self.inbox.forged.fetch_add(1, Ordering::Relaxed);
