@@ -84,9 +84,14 @@ impl LinkArgs {
         }
     }
 
+    /// Returns whether links are encrypted.
+    pub(crate) fn is_encrypted(&self) -> bool {
+        self.tls.tls_ca.is_some()
+    }
+
     /// Returns the protocol of endpoints, by which both ends know whether to encrypt.
     pub(crate) fn protocol(&self) -> &'static str {
-        if self.tls.tls_ca.is_some() { "tls" } else { "tcp" }
+        if self.is_encrypted() { "tls" } else { "tcp" }
     }
 }
 

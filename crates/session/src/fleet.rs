@@ -11,8 +11,9 @@ use sidestep_kernel::view::{Frame, Scenery};
 use sidestep_kernel::{Cycle, EntityId, InputError};
 use std::borrow::Cow;
 use std::fmt;
-use std::net::SocketAddrV4;
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// The program beside `sidestep` that alone contains the network stack.
 pub const LINK_PROGRAM: &str = "sidestep-link";
@@ -167,6 +168,23 @@ pub enum Topology {
     Star,
     /// By UDP multicast: a packet to many is sent once.
     Multicast,
+}
+
+/// Returns whether a datagram to a multicast group comes back on this machine, by its loopback interface.
+///
+/// # Errors
+/// With the reason of the system why it does not.
+pub fn check_loopback_multicast() -> std::io::Result<()> {
+    /// Time in which it comes back: it goes nowhere.
+    const TIMEOUT: Duration = Duration::from_secs(1);
+    // Of those that stay on a link (RFC 5771), and of no protocol.
+    const GROUP: Ipv4Addr = Ipv4Addr::new(224, 0, 0, 250);
+    let receiver = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
+    receiver.join_multicast_v4(&GROUP, &Ipv4Addr::LOCALHOST)?;
+    receiver.set_read_timeout(Some(TIMEOUT))?;
+    let sender = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
+    sender.send_to(&[0], (GROUP, receiver.local_addr()?.port()))?;
+    receiver.recv(&mut [0]).map(drop)
 }
 
 /// Certificates with which both ends of a link prove their identity; files in the format PEM.

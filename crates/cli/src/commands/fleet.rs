@@ -9,7 +9,9 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::text::{KeyValues, key_value_pair};
-use sidestep_session::fleet::{ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology};
+use sidestep_session::fleet::{
+    ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology, check_loopback_multicast,
+};
 use std::net::SocketAddrV4;
 use std::path::PathBuf;
 
@@ -73,9 +75,10 @@ pub(crate) struct FleetArgs {
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = parse_speed)]
     speed: f64,
 
-    /// Network topology: the route of packets from node to node
-    #[arg(long, value_enum, default_value_t = TopologyArg::Mesh)]
-    topology: TopologyArg,
+    /// Network topology: the route of packets from node to node [default: multicast where all
+    /// nodes are on this machine and need no certificates, else mesh]
+    #[arg(long, value_enum)]
+    topology: Option<TopologyArg>,
 
     /// Multicast group of the nodes, e.g. 239.255.7.1:7601
     /// [default: one that no other fleet has]
@@ -128,7 +131,8 @@ fn parse_group(text: &str) -> Result<SocketAddrV4, String> {
 pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Failure> {
     let mut table = FleetTable::new(console, args.watch);
     let mut end = None;
-    let result = run_job(&Job::Fleet(args.job()), |message| match message {
+    let topology = args.topology();
+    let result = run_job(&Job::Fleet(args.job(topology)), |message| match message {
         LinkMessage::Listens(endpoints) => {
             // A fleet in lockstep with all its nodes here ends before a user could join or watch it.
             if args.nodes.is_some() || args.clock == ClockArg::Realtime {
@@ -142,7 +146,7 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     });
     table.clear();
     if let Some((summary, outcome, fleet)) = end {
-        args.print_results(&summary, outcome, &fleet, console)?;
+        args.print_results(topology, &summary, outcome, &fleet, console)?;
     }
     match result {
         Ok(()) => Ok(ExitCode::Done),
@@ -155,7 +159,20 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
 }
 
 impl FleetArgs {
-    fn job(&self) -> FleetJob {
+    /// Returns the topology: if none is given, the cheapest that needs nothing of a network.
+    fn topology(&self) -> TopologyArg {
+        self.topology.unwrap_or_else(|| {
+            let is_local = self.nodes.is_none() && self.listen.is_empty();
+            // A group can be read by everybody on this machine; links with certificates cannot.
+            if is_local && !self.link.is_encrypted() && check_loopback_multicast().is_ok() {
+                TopologyArg::Multicast
+            } else {
+                TopologyArg::Mesh
+            }
+        })
+    }
+
+    fn job(&self, topology: TopologyArg) -> FleetJob {
         let loopback = format!("{}/127.0.0.1:0", self.link.protocol());
         FleetJob {
             common: self
@@ -166,7 +183,7 @@ impl FleetArgs {
                 ClockArg::Lockstep => ClockMode::Lockstep,
                 ClockArg::Realtime => ClockMode::Realtime { speed: self.speed },
             },
-            topology: match self.topology {
+            topology: match topology {
                 TopologyArg::Mesh => Topology::Mesh,
                 TopologyArg::Star => Topology::Star,
                 TopologyArg::Multicast => Topology::Multicast,
@@ -216,6 +233,7 @@ impl FleetArgs {
 
     fn print_results(
         &self,
+        topology: TopologyArg,
         summary: &Value,
         outcome: KeyValues,
         fleet: &FleetStatus,
@@ -229,7 +247,7 @@ impl FleetArgs {
             let cycles = group_thousands(summary["cycles"].as_u64().unwrap_or(0));
             let mut lines = vec![key_value_pair("cycles", cycles)];
             lines.extend(outcome);
-            lines.extend(self.network_lines(fleet));
+            lines.extend(self.network_lines(topology, fleet));
             lines.push(key_value_pair("digest", digest));
             lines
                 .extend(summary["folder"].as_str().map(|folder| key_value_pair("results", folder)));
@@ -237,9 +255,9 @@ impl FleetArgs {
         })
     }
 
-    fn network_lines(&self, fleet: &FleetStatus) -> KeyValues {
+    fn network_lines(&self, topology: TopologyArg, fleet: &FleetStatus) -> KeyValues {
         let nodes = &fleet.nodes;
-        let topology = match self.topology {
+        let topology = match topology {
             TopologyArg::Mesh => "in a mesh",
             TopologyArg::Star => "in a star",
             TopologyArg::Multicast => "by multicast",

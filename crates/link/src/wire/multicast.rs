@@ -197,7 +197,7 @@ mod tests {
     /// Returns a member of a group on this machine; `None`, with a printed reason, where that has no multicast.
     fn member(group: SocketAddrV4, waker: &SharedWaker) -> Option<MulticastSocket> {
         let joined = MulticastSocket::join(group, &[LOOPBACK.into()], waker);
-        joined.map_err(|error| sidestep_testing::skip(&error.to_string())).ok()
+        joined.map_err(|error| sidestep_testing::skip(error.to_string())).ok()
     }
 
     /// The receivers of a frame for more than one.

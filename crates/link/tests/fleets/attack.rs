@@ -60,7 +60,7 @@ impl OwnFleet {
             let mut common = common.clone();
             common.tls = Some(keys[airplane as usize].clone());
             let listen = match topology {
-                Topology::Star => Vec::new(),
+                Topology::Star | Topology::Multicast => Vec::new(),
                 Topology::Mesh => {
                     vec![reserve_port("tls/127.0.0.1:0").expect("a free port").endpoint]
                 }

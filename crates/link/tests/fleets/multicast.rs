@@ -7,23 +7,14 @@ use crate::tls::authority;
 use sidestep_link::peer::PeerId;
 use sidestep_link::protocol::{AgentPacket, Incarnation, Message, RecipientHeader, TransportFrame};
 use sidestep_link::wire::draw_group;
-use sidestep_session::fleet::{ClockMode, FleetJob, Job, Topology};
+use sidestep_session::fleet::{ClockMode, FleetJob, Job, Topology, check_loopback_multicast};
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Returns whether a datagram to a group comes back on this machine; the reason is printed where it does not.
 fn has_multicast() -> bool {
-    let group = draw_group();
-    let comes_back = || -> std::io::Result<()> {
-        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, group.port()))?;
-        socket.join_multicast_v4(group.ip(), &Ipv4Addr::LOCALHOST)?;
-        socket.set_read_timeout(Some(Duration::from_secs(5)))?;
-        let sender = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
-        sender.send_to(&[0], group)?;
-        socket.recv(&mut [0]).map(drop)
-    };
-    comes_back()
+    check_loopback_multicast()
         .inspect_err(|error| {
             sidestep_testing::skip(format!("this machine has no multicast: {error}"))
         })
