@@ -8,7 +8,7 @@ use super::*;
 use crate::deploy::run_pilot_conversations;
 use crate::world::AirspaceWorld;
 use crate::{AirspaceRun, RemotePilotRun, airspace_run};
-use sidestep_kernel::network::{Network, NetworkAgent, OutgoingPacket};
+use sidestep_kernel::network::{NetworkAgent, OutgoingPacket};
 use sidestep_kernel::{Cycle, EntityId, Simulation};
 use sidestep_scenario::Source;
 use std::sync::Arc;
