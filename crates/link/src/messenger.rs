@@ -250,8 +250,12 @@ impl Messenger {
 
     /// Sends a message that may be lost to several peers.
     pub fn multicast_best_effort(&mut self, to: &[PeerId], message: &Message) {
-        // Among many receivers the header fields would take more bytes than the message, and it matters little which
+        // Ids and header fields of many receivers would take more bytes than the message, and it matters little which
         // process of a peer gets what may be lost.
+        if self.are_all_other_nodes(to) {
+            self.publish(to, Vec::new(), Some(message));
+            return;
+        }
         let is_to_one = to.len() == 1;
         let mut recipients = Vec::with_capacity(to.len());
         for &peer in to {
@@ -298,19 +302,32 @@ impl Messenger {
             return;
         }
         let peers: Vec<PeerId> = to.iter().map(|recipient| recipient.peer).collect();
+        self.publish(&peers, to, message);
+    }
+
+    /// Returns whether these are all other nodes with which it has connected, and more than one.
+    fn are_all_other_nodes(&self, peers: &[PeerId]) -> bool {
+        let nodes = self.peers.keys().filter(|peer| matches!(peer, PeerId::Node(_)));
+        peers.len() > 1
+            && peers.len() == nodes.count()
+            && peers.iter().all(|peer| self.peers.contains_key(peer))
+    }
+
+    /// Sends a frame with a list of receivers to some peers.
+    fn publish(&mut self, peers: &[PeerId], to: Vec<RecipientHeader>, message: Option<&Message>) {
         let number = self.next_number;
         self.next_number += 1;
         let from = self.me;
         let incarnation = self.incarnation;
         let mut frame = TransportFrame { from, incarnation, number, to, message }.encode();
         if let Some(key) = &self.session_key
-            && is_signed(from, &peers)
+            && is_signed(from, peers)
         {
             frame = key.sign(frame);
         }
         self.stats.frames += 1;
         self.stats.bytes += frame.len() as u64;
-        self.wire.send(&peers, &frame);
+        self.wire.send(peers, &frame);
     }
 
     fn count_drop(&mut self, reason: &'static str) {
@@ -463,17 +480,20 @@ impl Messenger {
             }
         };
         let TransportFrame { from, incarnation, number, to, message } = frame;
-        // A frame for most nodes is published to all of them, so some frames are not for this peer.
-        let recipient = to.into_iter().find(|recipient| recipient.peer == self.me)?;
+        let is_among_nodes = matches!((from, self.me), (PeerId::Node(_), PeerId::Node(_)));
+        let recipient = if to.is_empty() && is_among_nodes {
+            RecipientHeader { peer: self.me, incarnation: None, ack: 0, sequence: None }
+        } else {
+            // A frame for most nodes is published to all of them, so some frames are not for this peer.
+            to.into_iter().find(|recipient| recipient.peer == self.me)?
+        };
         // A frame to the process that was here before has sequence numbers that mean nothing to this one.
         if recipient.incarnation.is_some_and(|to| to != self.incarnation) {
             self.count_drop(drop_reason::FORMER_LIFE);
             return None;
         }
         // What nodes say to each other is for members alone: another fleet may have the same multicast group.
-        if matches!((from, self.me), (PeerId::Node(_), PeerId::Node(_)))
-            && !self.is_connected(from, incarnation)
-        {
+        if is_among_nodes && !self.is_connected(from, incarnation) {
             self.count_drop(drop_reason::STRANGER);
             return None;
         }

@@ -34,7 +34,7 @@ pub struct TransportFrame<M = Message> {
     pub incarnation: Incarnation,
     /// Its number among the frames of this incarnation, from 0 on; one that comes twice was repeated on the way.
     pub number: u64,
-    /// The receivers; another peer that gets the frame ignores it.
+    /// The receivers; another peer that gets the frame ignores it. An empty list, from a node, stands for all other nodes.
     pub to: Vec<RecipientHeader>,
     /// The message, the same for all receivers; none in a frame that only acknowledges.
     pub message: Option<M>,

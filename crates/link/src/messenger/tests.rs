@@ -60,6 +60,43 @@ fn a_reliable_message_arrives_although_its_frame_is_lost_and_a_best_effort_one_d
     });
 }
 
+/// A wire that keeps what is sent.
+struct Kept(Arc<Mutex<Vec<Vec<u8>>>>);
+
+impl Wire for Kept {
+    fn send(&mut self, _: &[PeerId], frame: &[u8]) {
+        self.0.lock().expect("no panic").push(frame.to_vec());
+    }
+
+    fn receive(&mut self, _: Duration) -> Option<Vec<u8>> {
+        None
+    }
+}
+
+#[test]
+fn a_frame_to_all_other_nodes_names_none_of_them_and_is_read_by_members_alone() {
+    let frames = Arc::new(Mutex::new(Vec::new()));
+    let mut sender = Messenger::new(PeerId::Node(0), Box::new(Kept(frames.clone())));
+    let others: Vec<PeerId> = (1..50).map(PeerId::Node).collect();
+    let hub = MemoryHub::default();
+    let mut member = messenger(&hub, PeerId::Node(7), 0);
+    let mut stranger = messenger(&hub, PeerId::Node(8), 0);
+    member.connect(PeerId::Node(0), sender.incarnation());
+    for &peer in others.iter().chain(&[PeerId::Server]) {
+        sender.connect(peer, Incarnation(u64::MAX));
+    }
+    sender.multicast_best_effort(&others, &Message::Heartbeat);
+    sender.multicast_best_effort(&others[1..], &Message::Heartbeat);
+    let sent = frames.lock().expect("no panic").clone();
+    assert!(sent[0].len() < 40, "{} bytes", sent[0].len());
+    assert!(sent[1].len() > 4 * 48, "some of them are named");
+    let heard = member.decode_frame(&sent[0]).expect("it is for all nodes");
+    assert_eq!((heard.from, heard.message), (PeerId::Node(0), Message::Heartbeat));
+    assert_eq!(stranger.decode_frame(&sent[0]), None);
+    let mut server = messenger(&hub, PeerId::Server, 0);
+    assert_eq!(server.decode_frame(&sent[0]), None, "it is no node");
+}
+
 #[test]
 fn a_reliable_multicast_arrives_once_at_each_peer_in_the_order_of_its_link() {
     let hub = MemoryHub::default();
