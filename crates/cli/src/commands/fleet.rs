@@ -131,8 +131,7 @@ fn parse_group(text: &str) -> Result<SocketAddrV4, String> {
 pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Failure> {
     let mut table = FleetTable::new(console, args.watch);
     let mut end = None;
-    let topology = args.topology();
-    let result = run_job(&Job::Fleet(args.job(topology)), |message| match message {
+    let result = run_job(&Job::Fleet(args.job()), |message| match message {
         LinkMessage::Listens(endpoints) => {
             // A fleet in lockstep with all its nodes here ends before a user could join or watch it.
             if args.nodes.is_some() || args.clock == ClockArg::Realtime {
@@ -146,7 +145,7 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     });
     table.clear();
     if let Some((summary, outcome, fleet)) = end {
-        args.print_results(topology, &summary, outcome, &fleet, console)?;
+        args.print_results(&summary, outcome, &fleet, console)?;
     }
     match result {
         Ok(()) => Ok(ExitCode::Done),
@@ -172,7 +171,7 @@ impl FleetArgs {
         })
     }
 
-    fn job(&self, topology: TopologyArg) -> FleetJob {
+    fn job(&self) -> FleetJob {
         let loopback = format!("{}/127.0.0.1:0", self.link.protocol());
         FleetJob {
             common: self
@@ -183,7 +182,7 @@ impl FleetArgs {
                 ClockArg::Lockstep => ClockMode::Lockstep,
                 ClockArg::Realtime => ClockMode::Realtime { speed: self.speed },
             },
-            topology: match topology {
+            topology: match self.topology() {
                 TopologyArg::Mesh => Topology::Mesh,
                 TopologyArg::Star => Topology::Star,
                 TopologyArg::Multicast => Topology::Multicast,
@@ -233,7 +232,6 @@ impl FleetArgs {
 
     fn print_results(
         &self,
-        topology: TopologyArg,
         summary: &Value,
         outcome: KeyValues,
         fleet: &FleetStatus,
@@ -247,7 +245,7 @@ impl FleetArgs {
             let cycles = group_thousands(summary["cycles"].as_u64().unwrap_or(0));
             let mut lines = vec![key_value_pair("cycles", cycles)];
             lines.extend(outcome);
-            lines.extend(self.network_lines(topology, fleet));
+            lines.extend(self.network_lines(fleet));
             lines.push(key_value_pair("digest", digest));
             lines
                 .extend(summary["folder"].as_str().map(|folder| key_value_pair("results", folder)));
@@ -255,9 +253,9 @@ impl FleetArgs {
         })
     }
 
-    fn network_lines(&self, topology: TopologyArg, fleet: &FleetStatus) -> KeyValues {
+    fn network_lines(&self, fleet: &FleetStatus) -> KeyValues {
         let nodes = &fleet.nodes;
-        let topology = match topology {
+        let topology = match self.topology() {
             TopologyArg::Mesh => "in a mesh",
             TopologyArg::Star => "in a star",
             TopologyArg::Multicast => "by multicast",

@@ -5,7 +5,7 @@
 
 use super::PeerId;
 use super::endpoint::{WireSetupError, bare_host, endpoint_in_use, host_and_port};
-use crate::protocol::TransportFrame;
+use crate::protocol::{FleetMember, Incarnation, TransportFrame};
 use mio::net::UdpSocket;
 use mio::{Events, Interest, Poll, Token, Waker};
 use socket2::{Domain, Protocol, Socket, Type};
@@ -47,7 +47,9 @@ pub(super) struct MulticastSocket {
     own: UdpSocket,
     /// The address from which this node sends: its own datagrams come back to it, too.
     own_address: SocketAddr,
-    /// The addresses from which other nodes were last heard.
+    /// The incarnations of the members of the fleet: another fleet may have the same group.
+    members: BTreeMap<PeerId, Incarnation>,
+    /// The addresses from which members were last heard.
     addresses: BTreeMap<PeerId, SocketAddr>,
     buffer: Box<[u8]>,
 }
@@ -75,13 +77,23 @@ impl MulticastSocket {
         let _ = waker.set(Waker::new(poll.registry(), WAKER).map_err(taken)?);
         let events = Events::with_capacity(4);
         let buffer = vec![0; MAX_DATAGRAM_BYTES].into();
+        let members = BTreeMap::new();
         let addresses = BTreeMap::new();
-        Ok(Self { group, poll, events, receiver, own, own_address, addresses, buffer })
+        Ok(Self { group, poll, events, receiver, own, own_address, members, addresses, buffer })
+    }
+
+    /// Learns of the members of the fleet, some of which may have restarted.
+    pub(super) fn set_members(&mut self, members: &[FleetMember]) {
+        let known = std::mem::take(&mut self.members);
+        for member in members {
+            self.members.insert(PeerId::Node(member.agent), member.incarnation);
+        }
+        // A process that has taken the place of another one has an address of its own.
+        self.addresses.retain(|peer, _| known.get(peer) == self.members.get(peer));
     }
 
     /// Sends a frame to nodes of the group. One that the system does not take is lost, as in transit.
     pub(super) fn send(&self, to: &[PeerId], frame: &[u8]) {
-        // One that has restarted has another address, and tells it by what it sends first.
         let address = match to {
             [one] => self.addresses.get(one).copied(),
             _ => None,
@@ -93,11 +105,13 @@ impl MulticastSocket {
     pub(super) fn try_receive(&mut self) -> Option<(Option<PeerId>, Vec<u8>)> {
         let (frame, from) = receive_from(&self.own, self.own_address, &mut self.buffer)
             .or_else(|| receive_from(&self.receiver, self.own_address, &mut self.buffer))?;
-        let sender = TransportFrame::sender(&frame);
-        if let Some(sender) = sender {
+        let process = TransportFrame::sender_process(&frame);
+        if let Some((sender, incarnation)) = process
+            && self.members.get(&sender) == Some(&incarnation)
+        {
             self.addresses.insert(sender, from);
         }
-        Some((sender, frame))
+        Some((process.map(|(sender, _)| sender), frame))
     }
 
     /// Waits until something arrives here, or its waker is used, and at most the given time.
@@ -189,7 +203,7 @@ pub fn draw_group() -> SocketAddrV4 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::{Incarnation, Message};
+    use crate::protocol::Message;
     use std::time::Instant;
 
     const LOOPBACK: &str = "tcp/127.0.0.1:7600";
@@ -256,13 +270,27 @@ mod tests {
         let join = || member(group, &SharedWaker::default());
         let (Some(mut a), Some(mut b), Some(mut c)) = (join(), join(), join()) else { return };
         let [hello, to_one, to_all] = [frame_of(2, 0), frame_of(1, 1), frame_of(1, 2)];
+        let member = |incarnation| FleetMember {
+            agent: 2,
+            incarnation: Incarnation(incarnation),
+            listens: Vec::new(),
+            session: None,
+        };
+        a.set_members(&[member(7)]);
         c.send(&ALL, &hello);
-        assert!(receive(&mut a) == Some(hello.clone()) && receive(&mut b) == Some(hello));
+        assert_eq!(receive(&mut a), Some(hello.clone()));
+        assert!(a.addresses.is_empty(), "it is no member");
+        a.set_members(&[member(1)]);
+        c.send(&ALL, &hello);
+        assert_eq!(receive(&mut a), Some(hello.clone()));
+        assert_eq!([receive(&mut b), receive(&mut b)], [Some(hello.clone()), Some(hello)]);
         a.send(&[PeerId::Node(2)], &to_one);
         a.send(&ALL, &to_all);
         assert_eq!(receive(&mut b), Some(to_all.clone()), "what was for one does not come here");
         let heard = [receive(&mut c), receive(&mut c)];
         assert!(heard.contains(&Some(to_one)) && heard.contains(&Some(to_all)));
+        a.set_members(&[member(2)]);
+        assert!(a.addresses.is_empty(), "another process is in its place");
     }
 
     #[test]

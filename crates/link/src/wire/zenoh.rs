@@ -537,6 +537,9 @@ impl Wire for ZenohWire {
         let others = members.iter().map(|member| PeerId::Node(member.agent));
         self.other_nodes = others.filter(|&peer| peer != self.me).collect();
         self.other_nodes.sort_unstable();
+        if let Some(group) = &mut self.multicast {
+            group.set_members(members);
+        }
         // An open session reconnects to returning nodes by itself.
         if self.listens.is_empty() || self.mesh.is_some() {
             return Ok(());

@@ -21,7 +21,6 @@ use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
-pub(crate) use compile::MAX_STEPS_PER_DT;
 pub(super) use effectless::effectless_remarks;
 use network::NetworkSection;
 use optimizer::{LegsSection, MvpSection, OnOffSwitch, ReactiveSection, TimeList};

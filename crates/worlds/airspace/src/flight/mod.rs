@@ -32,6 +32,7 @@ pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
 pub use chart::Chart;
 pub use leg::{ConstantRateLeg, PairApproach, SeparationMinima, is_separation_lost};
 pub use levels::FlightLevelRange;
+pub(crate) use motion::MAX_STEPS_PER_DT;
 pub use motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
 pub use order::{FlightOrder, FlightTask, MAX_ORDERS};
 pub use pair_plane::PairPlane;

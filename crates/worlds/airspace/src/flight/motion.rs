@@ -78,6 +78,9 @@ pub(super) fn sinc(a: f64) -> f64 {
     if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { math::sin(a) / a }
 }
 
+/// Largest number of steps of a `dt`: each is flown, and its approaches are recorded, by itself.
+pub(crate) const MAX_STEPS_PER_DT: u64 = 1000;
+
 /// The times in which airplanes decide, fly a step, and look ahead.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TimeDiscretization {

@@ -2,8 +2,8 @@
 
 use super::start_groups::largest_start_group;
 use super::{AirspaceFile, CompiledAirspace, ParsedScenario, Preset};
-use crate::flight::FlightLevelRange;
 use crate::flight::{AirplaneStart, FlightTask};
+use crate::flight::{FlightLevelRange, MAX_STEPS_PER_DT};
 use crate::flight::{TimeDiscretization, WaypointRule};
 use crate::method::{MethodKind, OwnMethod};
 use crate::perceive::observed_pose;
@@ -27,8 +27,6 @@ const MIN_CYCLE_LIMIT: u64 = 400;
 const CYCLE_LIMIT_FACTOR: f64 = 3.0;
 /// Largest number of steps of a horizon: every action is predicted in all of them.
 const MAX_HORIZON_STEPS: f64 = 10_000.0;
-/// Largest number of steps of a `dt`: each is flown, and its approaches are recorded, by itself.
-pub(crate) const MAX_STEPS_PER_DT: u64 = 1000;
 /// Largest number of actions of an airplane: the work for a pair grows with its square.
 const MAX_ACTIONS: usize = 1000;
 /// Largest number of pairs of points of two airplanes' actions: a tenth of a second's work.

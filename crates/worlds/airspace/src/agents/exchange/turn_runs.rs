@@ -1,6 +1,6 @@
 //! Turn profiles in messages: as runs of equal turn rates, because most profiles have one or two rates.
 
-use crate::scenario::MAX_STEPS_PER_DT;
+use crate::flight::MAX_STEPS_PER_DT;
 use crate::shield::TurnProfile;
 use serde::de::{Deserializer, Error};
 use serde::{Deserialize, Serialize, Serializer};
