@@ -360,7 +360,12 @@ fn rewind(
         // The run was stopped after this table was finished, but before the last one was.
         disk::rename(&folder, &partial)?;
     }
-    fs::create_dir_all(&partial).map_err(|e| RecordError::new(partial.display(), e))?;
+    // Not its parent: a folder of a run that was deleted meanwhile stays deleted.
+    if let Err(error) = fs::create_dir(&partial)
+        && error.kind() != std::io::ErrorKind::AlreadyExists
+    {
+        return Err(RecordError::new(partial.display(), error));
+    }
     // This check must come before anything is deleted.
     check_sealed(&partial, cycle)?;
     for path in disk::list(&partial)? {

@@ -119,7 +119,9 @@ fn a_fleet_whose_folder_or_table_is_deleted_while_it_flies_ends_and_names_it() {
         let endless = ["fleet", "ring.toml", "--cycles", "1000000", "--out", "r", "--json"];
         let far = ["--set", "airspace.generator.radius_m=1000000"];
         let child = place.start(&[&endless[..], &far, clock].concat());
-        let tables = ["r/events.partial", "r/trajectories.partial"];
+        // All of them, so that none is begun after the others are gone.
+        let names = ["events", "optimizations", "trajectories"];
+        let tables = names.map(|name| format!("r/{name}.partial"));
         wait_for("the tables", || tables.iter().all(|table| place.path(table).exists()));
         std::fs::rename(place.path(gone), place.path("gone")).expect("moved");
         let ended = CommandOutput(child.wait_with_output().expect("ended"));
