@@ -307,10 +307,12 @@ impl Messenger {
 
     /// Returns whether these are all other nodes with which it has connected, and more than one.
     fn are_all_other_nodes(&self, peers: &[PeerId]) -> bool {
-        let nodes = self.peers.keys().filter(|peer| matches!(peer, PeerId::Node(_)));
-        peers.len() > 1
+        let is_node = |peer: &PeerId| matches!(peer, PeerId::Node(_));
+        let nodes = self.peers.keys().filter(|peer| is_node(peer));
+        is_node(&self.me)
+            && peers.len() > 1
             && peers.len() == nodes.count()
-            && peers.iter().all(|peer| self.peers.contains_key(peer))
+            && peers.iter().all(|peer| is_node(peer) && self.peers.contains_key(peer))
     }
 
     /// Sends a frame with a list of receivers to some peers.
@@ -535,7 +537,7 @@ impl Messenger {
             state.link.hasten(now);
         }
         state.last_heard = now;
-        // Without an incarnation the sender is not connected, and has nothing to acknowledge.
+        // Without an incarnation the frame is for many, or of one that is not connected: it acknowledges nothing.
         if header.incarnation.is_some() {
             state.link.on_ack(header.ack, now);
         }

@@ -45,7 +45,7 @@ pub struct TransportFrame<M = Message> {
 pub struct RecipientHeader {
     /// The receiver.
     pub peer: PeerId,
-    /// Its incarnation, if the sender knows it.
+    /// Its incarnation, if the sender knows it; none in frames to many that may be lost, which acknowledge nothing.
     pub incarnation: Option<Incarnation>,
     /// Cumulative acknowledgment: the sender has received all reliable messages of the receiver below this number.
     pub ack: u64,

@@ -7,6 +7,7 @@ use crate::link::{LOST_SERVER_REMEDY, LinkArgs, run_job};
 use crate::scenario_args::ScenarioArgs;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use sidestep::kernel::InputError;
 use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::text::{KeyValues, key_value_pair};
 use sidestep_session::fleet::{
@@ -126,12 +127,22 @@ fn parse_group(text: &str) -> Result<SocketAddrV4, String> {
     })
 }
 
+/// What a fleet has come to.
+struct FleetEnd {
+    topology: TopologyArg,
+    summary: Value,
+    outcome: KeyValues,
+    fleet: FleetStatus,
+}
+
 /// # Errors
 /// When anything is wrong with its input, or the fleet fails.
 pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Failure> {
     let mut table = FleetTable::new(console, args.watch);
     let mut end = None;
-    let result = run_job(&Job::Fleet(args.job()), |message| match message {
+    args.check_group()?;
+    let topology = args.topology();
+    let result = run_job(&Job::Fleet(args.job(topology)), |message| match message {
         LinkMessage::Listens(endpoints) => {
             // A fleet in lockstep with all its nodes here ends before a user could join or watch it.
             if args.nodes.is_some() || args.clock == ClockArg::Realtime {
@@ -139,13 +150,15 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
             }
         }
         LinkMessage::Fleet(now) => table.update(&now),
-        LinkMessage::Ended { summary, outcome, fleet } => end = Some((summary, outcome, fleet)),
+        LinkMessage::Ended { summary, outcome, fleet } => {
+            end = Some(FleetEnd { topology, summary, outcome, fleet });
+        }
         // `run_job` returns the failure; scenes and views are for watchers.
         LinkMessage::Failed(_) | LinkMessage::Scene(_) | LinkMessage::Seen(_) => {}
     });
     table.clear();
-    if let Some((summary, outcome, fleet)) = end {
-        args.print_results(&summary, outcome, &fleet, console)?;
+    if let Some(end) = end {
+        args.print_results(end, console)?;
     }
     match result {
         Ok(()) => Ok(ExitCode::Done),
@@ -158,9 +171,25 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
 }
 
 impl FleetArgs {
+    /// Checks that a multicast group is given only where nodes use one.
+    ///
+    /// # Errors
+    /// Where they do not.
+    fn check_group(&self) -> Result<(), InputError> {
+        if self.multicast_group.is_some()
+            && !matches!(self.topology, None | Some(TopologyArg::Multicast))
+        {
+            let cause = "only nodes by multicast have a group";
+            let remedy = "give --topology multicast, or leave --multicast-group out";
+            return Err(InputError::new("--multicast-group", cause, remedy));
+        }
+        Ok(())
+    }
+
     /// Returns the topology: if none is given, the cheapest that needs nothing of a network.
     fn topology(&self) -> TopologyArg {
-        self.topology.unwrap_or_else(|| {
+        let by_group = self.multicast_group.map(|_| TopologyArg::Multicast);
+        self.topology.or(by_group).unwrap_or_else(|| {
             let is_local = self.nodes.is_none() && self.listen.is_empty();
             // A group can be read by everybody on this machine; links with certificates cannot.
             if is_local && !self.link.is_encrypted() && check_loopback_multicast().is_ok() {
@@ -171,7 +200,7 @@ impl FleetArgs {
         })
     }
 
-    fn job(&self) -> FleetJob {
+    fn job(&self, topology: TopologyArg) -> FleetJob {
         let loopback = format!("{}/127.0.0.1:0", self.link.protocol());
         FleetJob {
             common: self
@@ -182,7 +211,7 @@ impl FleetArgs {
                 ClockArg::Lockstep => ClockMode::Lockstep,
                 ClockArg::Realtime => ClockMode::Realtime { speed: self.speed },
             },
-            topology: match self.topology() {
+            topology: match topology {
                 TopologyArg::Mesh => Topology::Mesh,
                 TopologyArg::Star => Topology::Star,
                 TopologyArg::Multicast => Topology::Multicast,
@@ -230,13 +259,8 @@ impl FleetArgs {
         }
     }
 
-    fn print_results(
-        &self,
-        summary: &Value,
-        outcome: KeyValues,
-        fleet: &FleetStatus,
-        console: Console,
-    ) -> Result<(), Failure> {
+    fn print_results(&self, end: FleetEnd, console: Console) -> Result<(), Failure> {
+        let FleetEnd { topology, summary, outcome, fleet } = end;
         let digest = summary["digest"].as_str().unwrap_or_default();
         let mut all = summary.clone();
         all["fleet"] = json!(fleet);
@@ -245,7 +269,7 @@ impl FleetArgs {
             let cycles = group_thousands(summary["cycles"].as_u64().unwrap_or(0));
             let mut lines = vec![key_value_pair("cycles", cycles)];
             lines.extend(outcome);
-            lines.extend(self.network_lines(fleet));
+            lines.extend(self.network_lines(topology, &fleet));
             lines.push(key_value_pair("digest", digest));
             lines
                 .extend(summary["folder"].as_str().map(|folder| key_value_pair("results", folder)));
@@ -253,9 +277,9 @@ impl FleetArgs {
         })
     }
 
-    fn network_lines(&self, fleet: &FleetStatus) -> KeyValues {
+    fn network_lines(&self, topology: TopologyArg, fleet: &FleetStatus) -> KeyValues {
         let nodes = &fleet.nodes;
-        let topology = match self.topology() {
+        let topology = match topology {
             TopologyArg::Mesh => "in a mesh",
             TopologyArg::Star => "in a star",
             TopologyArg::Multicast => "by multicast",

@@ -19,7 +19,9 @@ use crate::server::histogram::Histogram;
 use crate::server::{
     FleetContext, FleetError, FleetServer, NodeEntry, SILENCE_TIMEOUT, ServerConfig, ServerHooks,
 };
-use crate::wire::endpoint::{PortReservation, WireSetupError, reserve_port, with_port};
+use crate::wire::endpoint::{
+    PortReservation, WireSetupError, check_reachable, reserve_port, with_port,
+};
 use crate::wire::view_server::ViewServer;
 use crate::wire::zenoh::ZenohWire;
 use crate::wire::{PeerId, draw_group};
@@ -51,6 +53,10 @@ const MIN_JOIN_TIMEOUT_S: f64 = 30.0;
 pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let tls = job.common.tls.as_ref();
     check_identity(tls, |name| *name == CertificateName::Server, SERVER_NAME)?;
+    if job.topology == Topology::Multicast && job.nodes.is_some() {
+        // The interface by which a node reaches the server carries its packets: it must be the same network for all.
+        job.listen.iter().try_for_each(|at| check_reachable(at)).map_err(endpoint_error)?;
+    }
     let scenario = Scenario::read(&job.common.flown)?;
     // Before the overrides: nodes are given the scenario without them, and must find the same fingerprint.
     let fingerprint = scenario.fingerprint()?;

@@ -1,7 +1,8 @@
 //! A multicast group of UDP: a frame to many nodes is sent once, and the network copies it.
 //!
-//! A frame to one node goes to it alone, as soon as it was heard. A datagram arrives whole or not at all, and a lost one stops no other: what must arrive is repeated above
-//! (`arq.rs`). There are no links that could break, and nothing here waits for another node.
+//! Without certificates a frame to one node goes to it alone, as soon as it was heard. A datagram arrives whole or not at
+//! all, and a lost one stops no other: what must arrive is repeated above (`arq.rs`). There are no links that could
+//! break, and nothing here waits for another node.
 
 use super::PeerId;
 use super::endpoint::{WireSetupError, bare_host, endpoint_in_use, host_and_port};
@@ -92,13 +93,13 @@ impl MulticastSocket {
         self.addresses.retain(|peer, _| known.get(peer) == self.members.get(peer));
     }
 
-    /// Sends a frame to nodes of the group. One that the system does not take is lost, as in transit.
-    pub(super) fn send(&self, to: &[PeerId], frame: &[u8]) {
+    /// Sends a frame to nodes of the group, and returns whether the system has taken it.
+    pub(super) fn send(&self, to: &[PeerId], frame: &[u8]) -> bool {
         let address = match to {
             [one] => self.addresses.get(one).copied(),
             _ => None,
         };
-        let _ = self.own.send_to(frame, address.unwrap_or(self.group.into()));
+        self.own.send_to(frame, address.unwrap_or(self.group.into())).is_ok()
     }
 
     /// Returns the next frame that has arrived from another node, with the sender that it names, if any.
@@ -132,7 +133,7 @@ fn receive_from(
             Ok((_, from)) if from == own_address => {}
             Ok((length, from)) => return Some((buffer[..length].to_vec(), from)),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            // None is there, or the system reports that one of ours could not be delivered.
+            // None is there, or the socket has an error, which the next call may not have.
             Err(_) => return None,
         }
     }

@@ -470,10 +470,10 @@ impl Wire for ZenohWire {
     fn send(&mut self, to: &[PeerId], frame: &[u8]) {
         if let Some(group) = &self.multicast
             && !to.contains(&PeerId::Server)
-            // The server relays what is too large for a datagram.
+            // The server relays what is too large for a datagram, or what the system does not take.
             && frame.len() <= MAX_DATAGRAM_BYTES
+            && group.send(to, frame)
         {
-            group.send(to, frame);
             return;
         }
         let link = match &mut self.mesh {
@@ -508,7 +508,9 @@ impl Wire for ZenohWire {
             if let Ok(frame) = self.frames.try_recv() {
                 return Some(frame);
             }
-            while let Some((sender, frame)) = group.try_receive() {
+            let heard = group.try_receive();
+            let is_silent = heard.is_none();
+            if let Some((sender, frame)) = heard {
                 // Only a node sends to the group. Whoever names the server there would be believed: what that says is
                 // not signed, because it comes over a link with it.
                 if sender != Some(PeerId::Server) {
@@ -520,7 +522,9 @@ impl Wire for ZenohWire {
             if left.is_zero() {
                 return None;
             }
-            group.wait(left);
+            if is_silent {
+                group.wait(left);
+            }
         }
     }
 
@@ -537,7 +541,8 @@ impl Wire for ZenohWire {
         let others = members.iter().map(|member| PeerId::Node(member.agent));
         self.other_nodes = others.filter(|&peer| peer != self.me).collect();
         self.other_nodes.sort_unstable();
-        if let Some(group) = &mut self.multicast {
+        // With certificates nobody is believed by an address: whoever repeats a frame would have one.
+        if let (Some(group), None) = (&mut self.multicast, &self.credentials) {
             group.set_members(members);
         }
         // An open session reconnects to returning nodes by itself.
