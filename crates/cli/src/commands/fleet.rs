@@ -77,7 +77,7 @@ pub(crate) struct FleetArgs {
     speed: f64,
 
     /// Network topology: the route of packets from node to node [default: multicast where all
-    /// nodes are on this machine and need no certificates, else mesh]
+    /// nodes are started here, without --listen and without certificates; else mesh]
     #[arg(long, value_enum)]
     topology: Option<TopologyArg>,
 

@@ -60,10 +60,10 @@ fn a_reliable_message_arrives_although_its_frame_is_lost_and_a_best_effort_one_d
     });
 }
 
-/// A wire that keeps what is sent.
-struct Kept(Arc<Mutex<Vec<Vec<u8>>>>);
+/// A wire that records the frames that are sent.
+struct RecordingWire(Arc<Mutex<Vec<Vec<u8>>>>);
 
-impl Wire for Kept {
+impl Wire for RecordingWire {
     fn send(&mut self, _: &[PeerId], frame: &[u8]) {
         self.0.lock().expect("no panic").push(frame.to_vec());
     }
@@ -76,7 +76,7 @@ impl Wire for Kept {
 #[test]
 fn a_frame_to_all_other_nodes_names_none_of_them_and_is_read_by_members_alone() {
     let frames = Arc::new(Mutex::new(Vec::new()));
-    let mut sender = Messenger::new(PeerId::Node(0), Box::new(Kept(frames.clone())));
+    let mut sender = Messenger::new(PeerId::Node(0), Box::new(RecordingWire(frames.clone())));
     let others: Vec<PeerId> = (1..50).map(PeerId::Node).collect();
     let hub = MemoryHub::default();
     let mut member = messenger(&hub, PeerId::Node(7), 0);

@@ -48,9 +48,7 @@ impl DenialLog {
     }
 
     fn report_messages(&mut self, Denials { count, last }: &Denials) {
-        let before = self.messages;
-        self.messages += count;
-        if has_doubled(before, self.messages) {
+        if add(&mut self.messages, *count) {
             tracing::warn!(
                 count = self.messages,
                 last = &*escape_controls(last),
@@ -73,9 +71,7 @@ impl DenialLog {
             "its certificate is for `{name}` (its common name), which is nobody in this fleet"
         );
         let total = self.strangers.entry(name).or_default();
-        let before = *total;
-        *total += count;
-        if !has_doubled(before, *total) {
+        if !add(total, count) {
             return None;
         }
         Some(Stranger { count: *total, cause, remedy: self.stranger_remedy() })
@@ -95,9 +91,7 @@ impl DenialLog {
 
     fn report_rejections(&mut self, kind: RejectionKind, Rejections { count, last }: &Rejections) {
         let total = self.rejected.entry(kind).or_default();
-        let before = *total;
-        *total += count;
-        if !has_doubled(before, *total) {
+        if !add(total, *count) {
             return;
         }
         let Explanation { cause, remedy } = explanation(kind);
@@ -147,6 +141,13 @@ fn explanation(kind: RejectionKind) -> Explanation {
             remedy: "see what connects to this address: a program without certificates, or a scan of ports",
         },
     }
+}
+
+/// Adds to a count, and returns whether that is to be told.
+fn add(total: &mut u64, count: u64) -> bool {
+    let before = *total;
+    *total += count;
+    has_doubled(before, *total)
 }
 
 /// Returns whether a count has reached 1, or a power of two, on its way.
