@@ -12,8 +12,8 @@
 //! until it has those of 60 seals.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use parquet::file::metadata::KeyValue;
 use parquet::schema::types::TypePtr;
@@ -361,10 +361,16 @@ fn rewind(
         disk::rename(&folder, &partial)?;
     }
     // Not its parent: a folder of a run that was deleted meanwhile stays deleted.
-    if let Err(error) = fs::create_dir(&partial)
-        && error.kind() != std::io::ErrorKind::AlreadyExists
-    {
-        return Err(RecordError::new(partial.display(), error));
+    if let Err(error) = fs::create_dir(&partial) {
+        match error.kind() {
+            io::ErrorKind::AlreadyExists => {}
+            // The folder was there when the run was created: it is no mistake in the path that was given.
+            io::ErrorKind::NotFound => {
+                let cause = format!("the folder of the tables {DELETED_TABLE}");
+                return Err(RecordError::new(parent.display(), cause));
+            }
+            _ => return Err(RecordError::new(partial.display(), error)),
+        }
     }
     // This check must come before anything is deleted.
     check_sealed(&partial, cycle)?;

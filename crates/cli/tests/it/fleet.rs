@@ -109,20 +109,21 @@ fn a_fleet_whose_folder_or_table_is_deleted_while_it_flies_ends_and_names_it() {
         return;
     }
     let realtime = ["--clock", "realtime", "--speed", "30"];
-    for (clock, gone) in [
-        (&[][..], "r"),
-        (&realtime, "r"),
-        (&realtime, "r/trajectories.partial"),
-        (&realtime, "r/events.partial"),
+    let simulated_tables = ["events", "optimizations", "trajectories"];
+    let flown_tables = ["controls", "events", "optimizations", "trajectories"];
+    for (clock, names, gone) in [
+        (&[][..], &simulated_tables[..], "r"),
+        (&realtime, &flown_tables, "r"),
+        (&realtime, &flown_tables, "r/trajectories.partial"),
+        (&realtime, &flown_tables, "r/events.partial"),
     ] {
         let place = place();
         let endless = ["fleet", "ring.toml", "--cycles", "1000000", "--out", "r", "--json"];
         let far = ["--set", "airspace.generator.radius_m=1000000"];
         let child = place.start(&[&endless[..], &far, clock].concat());
         // All of them, so that none is begun after the others are gone.
-        let names = ["events", "optimizations", "trajectories"];
-        let tables = names.map(|name| format!("r/{name}.partial"));
-        wait_for("the tables", || tables.iter().all(|table| place.path(table).exists()));
+        let is_begun = |name: &&str| place.path(&format!("r/{name}.partial")).exists();
+        wait_for("the tables", || names.iter().all(is_begun));
         std::fs::rename(place.path(gone), place.path("gone")).expect("moved");
         let ended = CommandOutput(child.wait_with_output().expect("ended"));
         assert_eq!((ended.code(), ended.out().as_str()), (1, ""), "{gone}: {}", ended.err());

@@ -101,6 +101,18 @@ fn two_writers_of_one_folder_are_refused() {
 }
 
 #[test]
+fn tables_are_not_begun_in_a_folder_that_was_deleted_and_the_error_says_so() {
+    let parent = tempfile::tempdir().unwrap();
+    let path = parent.path().join("a");
+    let folder = create(&path);
+    fs::rename(&path, parent.path().join("moved")).unwrap();
+    let Err(error) = folder.recorder(&[trajectories()], 0) else { panic!("a table was begun") };
+    let told = error.to_string();
+    assert!(told.contains("deleted or moved while the run wrote to it"), "{told}");
+    assert!(!path.exists());
+}
+
+#[test]
 fn only_runs_are_replaced_and_only_on_request() {
     let parent = tempfile::tempdir().unwrap();
     let run = parent.path().join("run");
