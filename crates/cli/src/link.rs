@@ -6,11 +6,11 @@ use crate::worlds;
 use clap::Args;
 use sidestep::kernel::InputError;
 use sidestep_session::fleet::{
-    CommonSettings, Job, JobError, JobScenario, LINK_PROGRAM, LinkMessage, Tls,
+    CommonSettings, Job, JobError, JobScenario, LINK_PROGRAM, LinkMessage, Tls, link_command,
 };
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
-use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -159,7 +159,7 @@ pub(crate) fn run_job(job: &Job, mut on_message: impl FnMut(LinkMessage)) -> Res
 }
 
 fn spawn_program() -> Result<Child, Failure> {
-    let mut command = Command::new(find_program()?);
+    let mut command = link_command(find_program()?);
     command.stdin(Stdio::piped()).stdout(Stdio::piped());
     // A terminal sends Ctrl-C to a whole process group. In a group of its own, the program does not get it: this process asks it
     // to end, so that the fleet can finish its cycle.

@@ -12,6 +12,7 @@ use sidestep_link::wire::zenoh::ZenohWire;
 use sidestep_link::wire::{PeerId, Wire};
 use sidestep_session::fleet::{
     ClockMode, CommonSettings, FleetJob, FleetStatus, Job, JobScenario, LinkMessage, Topology,
+    link_command,
 };
 use sidestep_session::{ManagedRun, NoWatcher, OutputPaths};
 use std::collections::{BTreeMap, BTreeSet};
@@ -180,7 +181,7 @@ fn job(folder: &Path, clock: ClockMode) -> FleetJob {
 
 /// Flies a fleet; `look` may end it. Returns the digest, and the fleet at the end.
 fn fly(job: FleetJob, mut look: impl FnMut(&FleetStatus) -> bool) -> (String, FleetStatus) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
+    let mut command = link_command(env!("CARGO_BIN_EXE_sidestep-link"));
     let mut child =
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("the program starts");
     let mut stdin = child.stdin.take();
@@ -321,7 +322,7 @@ enum FleetNews {
 
 /// Starts a fleet; the second channel tells its news until it ends.
 fn start_watched(job: FleetJob) -> (Child, Receiver<FleetNews>) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
+    let mut command = link_command(env!("CARGO_BIN_EXE_sidestep-link"));
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("the program starts");
     let stdin = child.stdin.as_mut().expect("a pipe");

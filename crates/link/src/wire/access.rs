@@ -1,7 +1,10 @@
 //! Access control of Zenoh: who may publish and subscribe what at an endpoint, by the common names of certificates.
 //! Everything else is denied.
 //!
-//! A key names sender and receiver, `sidestep/FROM/TO`. A node may publish under its own name only, and receive only
+//! A key names sender, receiver and the receiver's session, `sidestep/FROM/TO/SESSION`. It is published for whatever
+//! session, `sidestep/FROM/TO/*`, and each session subscribes to a key that no other one has: Zenoh (1.10) keeps what it
+//! knows of a closed connection, some kilobytes, for as long as anyone else has subscribed to one of its keys. A node may
+//! publish under its own name only, and receive only
 //! what is for it or for all nodes; queries for views are for viewers. Zenoh drops what is denied and says so only in its
 //! most detailed log: [`DenialLayer`] counts that.
 
@@ -66,18 +69,26 @@ struct Rights {
     queries_out: Vec<String>,
 }
 
+/// Whatever session a peer has.
+const ANY_SESSION: &str = "*";
+
 /// Returns the key under which a frame from one peer to another is published.
 pub(super) fn frame_key(from: PeerId, to: impl fmt::Display) -> String {
-    format!("sidestep/{from}/{to}")
+    format!("sidestep/{from}/{to}/{ANY_SESSION}")
 }
 
 /// Returns the keys of frames for a peer, whoever sends them.
-pub(super) fn keys_to(to: PeerId) -> Vec<String> {
-    let mut keys = vec![format!("sidestep/*/{to}")];
+fn keys_to(to: PeerId) -> Vec<String> {
+    keys_to_session(to, ANY_SESSION)
+}
+
+/// Returns the keys to which a session of a peer subscribes. No other session has them.
+pub(super) fn keys_to_session(to: PeerId, session: impl fmt::Display) -> Vec<String> {
+    let mut keys = vec![format!("sidestep/*/{to}/{session}")];
     if to != PeerId::Server {
         // Other sessions learn of the subscriptions in this order: so one that can reach this peer by its own key reaches
         // it with broadcasts, too. Broadcasts are for nodes only.
-        keys.insert(0, format!("sidestep/*/{ALL}"));
+        keys.insert(0, format!("sidestep/*/{ALL}/{session}"));
     }
     keys
 }
@@ -346,6 +357,21 @@ mod tests {
         );
         assert!(!preview.is_denied_act("1f on lo is authorized to Put (ingress) on sidestep/1/0"));
         assert!(!preview.is_denied_act("1f on lo is unauthorized to Query (egress) on sidestep"));
+    }
+
+    #[test]
+    fn two_sessions_of_a_peer_subscribe_to_keys_of_their_own_and_the_frames_for_it_match_both() {
+        use zenoh::key_expr::keyexpr;
+        for to in [PeerId::Server, PeerId::Node(3)] {
+            let sessions = ["1f", "2f"].map(|session| keys_to_session(to, session));
+            assert!(sessions[0].iter().all(|key| !sessions[1].contains(key)), "{sessions:?}");
+            let frame = frame_key(PeerId::Node(1), to);
+            let frame = keyexpr::new(&frame).expect("a key");
+            let is_reached = |key: &String| keyexpr::new(key).expect("a key").intersects(frame);
+            assert!(sessions.iter().all(|keys| keys.iter().any(is_reached)), "{to}");
+            let other = keys_to_session(PeerId::Node(4), "3f");
+            assert!(!other.iter().any(is_reached), "{to}");
+        }
     }
 
     #[test]

@@ -7,7 +7,9 @@
 
 mod echo;
 
-use super::access::{ALL, Credentials, Guarded, access_control, frame_key, keys_to, sender_of};
+use super::access::{
+    ALL, Credentials, Guarded, access_control, frame_key, keys_to_session, sender_of,
+};
 use super::endpoint::{
     PortReservation, WireSetupError, check_vacant, connection_problem, endpoint_in_use,
     host_and_port, without_sources,
@@ -261,7 +263,7 @@ impl ZenohLink {
         echoes: &EchoProbes,
     ) -> Result<Self, String> {
         let mut subscribers = Vec::new();
-        for key in keys_to(me) {
+        for key in keys_to_session(me, session.zid()) {
             subscribers.push(subscribe(&session, &key, me, inbox, echoes)?);
         }
         Ok(Self { me, keys: BTreeMap::new(), _subscribers: subscribers, session })

@@ -160,24 +160,27 @@ fn forgeries() -> Vec<(&'static str, Vec<u8>)> {
     let letter = frame(other, victim, Message::Packets(vec![packet]));
     vec![
         // Under the names of others.
-        ("sidestep/server/0", dismissal.clone()),
-        ("sidestep/server/0", percept.clone()),
-        ("sidestep/server/all", dismissal.clone()),
-        ("sidestep/0/server", control.clone()),
-        ("sidestep/2/0", letter.clone()),
+        ("sidestep/server/0/*", dismissal.clone()),
+        ("sidestep/server/0/*", percept.clone()),
+        ("sidestep/server/all/*", dismissal.clone()),
+        ("sidestep/*/0/*", dismissal.clone()),
+        ("sidestep/**", dismissal.clone()),
+        ("sidestep/0/server/*", control.clone()),
+        ("sidestep/2/0/*", letter.clone()),
         // The words of others under its own.
-        ("sidestep/1/0", dismissal.clone()),
-        ("sidestep/1/0", percept),
-        ("sidestep/1/all", dismissal),
-        ("sidestep/1/0", letter),
-        ("sidestep/1/server", control),
+        ("sidestep/1/0/*", dismissal.clone()),
+        ("sidestep/1/0/*", percept),
+        ("sidestep/1/all/*", dismissal),
+        ("sidestep/1/0/*", letter),
+        ("sidestep/1/server/*", control),
     ]
 }
 
 /// Subscribes to everything of others, and notes what is heard.
 fn listen(attacker: &Session, heard: &Arc<Mutex<Vec<String>>>) -> Vec<Subscriber<()>> {
     let mut subscribers = Vec::new();
-    for key in ["sidestep/**", "sidestep/*/0", "sidestep/server/*", "sidestep/*/server", "**"] {
+    for key in ["sidestep/**", "sidestep/*/0/*", "sidestep/server/**", "sidestep/*/server/*", "**"]
+    {
         let heard = heard.clone();
         let subscriber = attacker.declare_subscriber(key).callback(move |sample| {
             heard.lock().expect("no panic").push(sample.key_expr().to_string());

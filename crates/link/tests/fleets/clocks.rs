@@ -4,7 +4,7 @@ use crate::processes::{LinkProcess, folder, job, signal};
 use crate::support::{run_in_one_process, superconflict, wide};
 use serde_json::Value;
 use sidestep_session::fleet::{
-    AgentName, ClockMode, FleetJob, FleetStatus, Job, LinkMessage, NodeJob, Topology,
+    AgentName, ClockMode, FleetJob, FleetStatus, Job, LinkMessage, NodeJob, Topology, link_command,
 };
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -63,7 +63,7 @@ fn jumping_clock(folder: &Path) -> Option<PathBuf> {
 }
 
 fn start(job: &FleetJob, clock: &Path) -> LinkProcess {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sidestep-link"));
+    let mut command = link_command(env!("CARGO_BIN_EXE_sidestep-link"));
     command.env("LD_PRELOAD", clock);
     LinkProcess::start_by(command, &Job::Fleet(job.clone()))
 }
@@ -157,7 +157,7 @@ fn a_node_whose_machine_runs_since_another_day_flies_with_the_rest() {
     let agent = AgentName::new("airplane", 2, None);
     let (listen, patience_s) = (vec!["tcp/127.0.0.1:0".into()], 30.0);
     let node = Job::Node(NodeJob { common, agent, connect, listen, patience_s });
-    let mut command = Command::new("unshare");
+    let mut command = link_command("unshare");
     command.args(shifted).arg(env!("CARGO_BIN_EXE_sidestep-link"));
     let node = LinkProcess::start_by(command, &node);
     let (summary, _) = server.complete();

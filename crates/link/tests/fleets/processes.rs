@@ -5,7 +5,7 @@ use serde_json::Value;
 use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
     ClockMode, CommonSettings, FleetJob, FleetStatus, Job, JobError, JobScenario, LinkMessage,
-    Topology,
+    Topology, link_command,
 };
 use sidestep_session::{ManagedRun, NoWatcher, RunStatus};
 use std::io::{BufRead, BufReader, Write};
@@ -61,12 +61,12 @@ pub(crate) struct LinkProcess {
 
 impl LinkProcess {
     pub(crate) fn start(job: &Job) -> Self {
-        Self::start_by(Command::new(env!("CARGO_BIN_EXE_sidestep-link")), job)
+        Self::start_by(link_command(env!("CARGO_BIN_EXE_sidestep-link")), job)
     }
 
     /// Starts the program in a network namespace.
     pub(crate) fn start_in(namespace: &str, job: &Job) -> Self {
-        let mut command = Command::new("ip");
+        let mut command = link_command("ip");
         command.args(["netns", "exec", namespace, env!("CARGO_BIN_EXE_sidestep-link")]);
         Self::start_by(command, job)
     }
