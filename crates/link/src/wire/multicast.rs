@@ -18,6 +18,7 @@ use std::net::{
     IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, ToSocketAddrs, UdpSocket as StdUdpSocket,
 };
 use std::sync::{Arc, OnceLock};
+use std::thread;
 use std::time::Duration;
 
 /// Maximum size of a datagram's content: what a length of 16 bits leaves beside the headers of IPv4 and UDP.
@@ -29,6 +30,11 @@ const RECEIVE_BUFFER_BYTES: usize = 1 << 20;
 
 /// Maximum number of routers between two nodes, which have to be told to forward multicast at all.
 const TIME_TO_LIVE: u32 = 8;
+
+/// Number of times that a node lets other processes run before it sleeps until a datagram arrives. Nodes of one machine take
+/// turns: what the others send meanwhile is read in one go, and nobody has to wake this node for each of it. Where no
+/// other process wants to run, these are some microseconds.
+const YIELDS_BEFORE_SLEEP: usize = 8;
 
 const GROUP_SOCKET: Token = Token(0);
 const OWN_SOCKET: Token = Token(1);
@@ -43,9 +49,9 @@ pub(super) struct MulticastSocket {
     poll: Poll,
     events: Events,
     /// Receives what is sent to the group.
-    receiver: UdpSocket,
+    receiver: ReadySocket,
     /// Sends, and receives what is for this node alone.
-    own: UdpSocket,
+    own: ReadySocket,
     /// The address from which this node sends: its own datagrams come back to it, too.
     own_address: SocketAddr,
     /// The incarnations of the members of the fleet: another fleet may have the same group.
@@ -53,6 +59,13 @@ pub(super) struct MulticastSocket {
     /// The addresses from which members were last heard.
     addresses: BTreeMap<PeerId, SocketAddr>,
     buffer: Box<[u8]>,
+}
+
+/// A socket, and whether datagrams may be there. The system tells that once, when the first one arrives: until the socket
+/// was found empty, it has to be read without asking.
+struct ReadySocket {
+    socket: UdpSocket,
+    is_ready: bool,
 }
 
 impl MulticastSocket {
@@ -75,6 +88,7 @@ impl MulticastSocket {
         poll.registry().register(&mut receiver, GROUP_SOCKET, readable).map_err(taken)?;
         poll.registry().register(&mut own, OWN_SOCKET, readable).map_err(taken)?;
         let own_address = own.local_addr().map_err(taken)?;
+        let [receiver, own] = [receiver, own].map(|socket| ReadySocket { socket, is_ready: true });
         let _ = waker.set(Waker::new(poll.registry(), WAKER).map_err(taken)?);
         let events = Events::with_capacity(4);
         let buffer = vec![0; MAX_DATAGRAM_BYTES].into();
@@ -99,13 +113,15 @@ impl MulticastSocket {
             [one] => self.addresses.get(one).copied(),
             _ => None,
         };
-        self.own.send_to(frame, address.unwrap_or(self.group.into())).is_ok()
+        self.own.socket.send_to(frame, address.unwrap_or(self.group.into())).is_ok()
     }
 
     /// Returns the next frame that has arrived from another node, with the sender that it names, if any.
     pub(super) fn try_receive(&mut self) -> Option<(Option<PeerId>, Vec<u8>)> {
-        let (frame, from) = receive_from(&self.own, self.own_address, &mut self.buffer)
-            .or_else(|| receive_from(&self.receiver, self.own_address, &mut self.buffer))?;
+        let Self { own, receiver, buffer, own_address, .. } = self;
+        let (frame, from) = own
+            .try_receive(*own_address, buffer)
+            .or_else(|| receiver.try_receive(*own_address, buffer))?;
         let process = TransportFrame::sender_process(&frame);
         if let Some((sender, incarnation)) = process
             && self.members.get(&sender) == Some(&incarnation)
@@ -117,25 +133,50 @@ impl MulticastSocket {
 
     /// Waits until something arrives here, or its waker is used, and at most the given time.
     pub(super) fn wait(&mut self, within: Duration) {
-        // An interrupt is like an arrival: the caller looks what there is.
-        let _ = self.poll.poll(&mut self.events, Some(within));
+        for _ in 0..YIELDS_BEFORE_SLEEP {
+            thread::yield_now();
+            if self.poll_events(Duration::ZERO) {
+                return;
+            }
+        }
+        self.poll_events(within);
+    }
+
+    /// Waits for an event, and returns whether there was one.
+    fn poll_events(&mut self, within: Duration) -> bool {
+        if self.poll.poll(&mut self.events, Some(within)).is_err() {
+            // An interrupt is like an arrival: the caller looks what there is.
+            return true;
+        }
+        for event in &self.events {
+            match event.token() {
+                GROUP_SOCKET => self.receiver.is_ready = true,
+                OWN_SOCKET => self.own.is_ready = true,
+                _ => {}
+            }
+        }
+        !self.events.is_empty()
     }
 }
 
-/// Returns the next datagram of a socket that is not this node's own, and the address of its sender.
-fn receive_from(
-    socket: &UdpSocket,
-    own_address: SocketAddr,
-    buffer: &mut [u8],
-) -> Option<(Vec<u8>, SocketAddr)> {
-    loop {
-        match socket.recv_from(buffer) {
-            Ok((_, from)) if from == own_address => {}
-            Ok((length, from)) => return Some((buffer[..length].to_vec(), from)),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            // None is there, or the socket has an error, which the next call may not have.
-            Err(_) => return None,
+impl ReadySocket {
+    /// Returns the next datagram that is not this node's own, and the address of its sender.
+    fn try_receive(
+        &mut self,
+        own_address: SocketAddr,
+        buffer: &mut [u8],
+    ) -> Option<(Vec<u8>, SocketAddr)> {
+        while self.is_ready {
+            match self.socket.recv_from(buffer) {
+                Ok((_, from)) if from == own_address => {}
+                Ok((length, from)) => return Some((buffer[..length].to_vec(), from)),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => self.is_ready = false,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                // The socket has an error, which the next call may not have.
+                Err(_) => return None,
+            }
         }
+        None
     }
 }
 
