@@ -1,16 +1,19 @@
 //! What killed commands leave is removed by the next command that writes to the same place, and nothing else is; what
 //! vanishes during work ends it.
 
-use crate::support::{CommandOutput, TestFolder, names, signal, wait_for};
+use crate::support::{CommandOutput, TestFolder, names, signal, stop, wait_for};
 use std::path::PathBuf;
 use std::process::Child;
 
 /// An export that takes some seconds: it draws 150 pictures.
 const EXPORT: [&str; 6] = ["export", "r", "--to", "mp4-frames", "--out", "film"];
 
-fn recorded() -> TestFolder {
+/// Number of cycles of which an export takes some seconds in any form.
+const MANY_CYCLES: u32 = 6_000;
+
+fn recorded(cycles: u32) -> TestFolder {
     let place = TestFolder::new();
-    place.json(&["run", "s.toml", "--cycles", "600", "--out", "r"]);
+    place.json(&["run", "s.toml", "--cycles", &cycles.to_string(), "--out", "r"]);
     place
 }
 
@@ -29,7 +32,7 @@ fn export_under_way(place: &TestFolder) -> (Child, PathBuf) {
 
 #[test]
 fn what_a_killed_export_left_is_removed_by_the_next_one_to_the_same_place_which_says_so() {
-    let place = recorded();
+    let place = recorded(600);
     let (mut child, left) = export_under_way(&place);
     child.kill().expect("killed");
     child.wait().expect("gone");
@@ -51,9 +54,9 @@ fn what_a_killed_export_left_is_removed_by_the_next_one_to_the_same_place_which_
 
 #[test]
 fn the_folder_of_a_process_at_work_and_what_is_not_ours_stay() {
-    let place = recorded();
+    let place = recorded(600);
     let (mut child, at_work) = export_under_way(&place);
-    signal(&child, "STOP");
+    stop(&child);
     let pictures = names(&at_work).len();
     // Of a user: without the mark of an export, or with one that names no process.
     std::fs::create_dir(place.path(".film.new-1")).expect("made");
@@ -93,7 +96,7 @@ fn what_a_killed_plan_of_a_sweep_left_is_removed_by_the_next_one() {
 
 #[test]
 fn an_export_whose_place_is_deleted_meanwhile_fails_and_names_it() {
-    let place = recorded();
+    let place = recorded(MANY_CYCLES);
     std::fs::create_dir(place.path("deep")).expect("made");
     let forms = [("mp4-frames", "frame-00002.png"), ("rosbag", "bag_0.mcap")];
     for (form, first) in forms {
@@ -101,7 +104,7 @@ fn an_export_whose_place_is_deleted_meanwhile_fails_and_names_it() {
         let child = place.start(&args);
         let folder = format!("deep/.x.new-{}", child.id());
         wait_for("the first file", || place.path(&folder).join(first).exists());
-        signal(&child, "STOP");
+        stop(&child);
         std::fs::remove_dir_all(place.path("deep")).expect("removed");
         signal(&child, "CONT");
         let ended = CommandOutput(child.wait_with_output().expect("ended"));
@@ -117,7 +120,7 @@ fn an_export_whose_place_is_deleted_meanwhile_fails_and_names_it() {
     let child = place.start(&EXPORT);
     let folder = place.path(&format!(".film.new-{}", child.id()));
     wait_for("some pictures", || folder.join("frame-00002.png").exists());
-    signal(&child, "STOP");
+    stop(&child);
     for name in names(&folder) {
         std::fs::remove_file(folder.join(name)).expect("removed");
     }
@@ -130,14 +133,14 @@ fn an_export_whose_place_is_deleted_meanwhile_fails_and_names_it() {
 
 #[test]
 fn an_exported_file_whose_folder_is_deleted_meanwhile_fails_and_names_it() {
-    let place = recorded();
+    let place = recorded(MANY_CYCLES);
     for (form, partial) in [("gif", "x.gif.PID.partial"), ("mcap", "x.mcap.partial")] {
         std::fs::create_dir(place.path("deep")).expect("made");
         let out = format!("deep/x.{form}");
         let child = place.start(&["export", "r", "--to", form, "--out", &out, "--json"]);
         let partial = partial.replace("PID", &child.id().to_string());
         wait_for("the file", || place.path("deep").join(&partial).exists());
-        signal(&child, "STOP");
+        stop(&child);
         std::fs::remove_dir_all(place.path("deep")).expect("removed");
         signal(&child, "CONT");
         let ended = CommandOutput(child.wait_with_output().expect("ended"));

@@ -183,6 +183,16 @@ pub(crate) fn signal(child: &Child, name: &str) {
     assert!(sent.expect("kill is there").success());
 }
 
+/// Stops a process, and waits until it stands still.
+pub(crate) fn stop(child: &Child) {
+    signal(child, "STOP");
+    wait_for("a standstill", || {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id()));
+        // Its state follows the name of the program, in parentheses. Other systems have no such file.
+        stat.map_or(true, |stat| stat.rsplit(") ").next().is_some_and(|rest| rest.starts_with('T')))
+    });
+}
+
 /// A small file system that lasts as long as this value.
 pub(crate) struct SmallDisk<'a>(&'a Path);
 

@@ -26,8 +26,12 @@ pub(super) struct DenialLog {
 
 impl DenialLog {
     pub(super) fn new(credentials: Option<&Credentials>) -> Self {
-        let agents = credentials.map(|own| own.agents.clone()).unwrap_or_default();
-        Self { agents, ..Self::default() }
+        Self {
+            agents: credentials.map(|own| own.agents.clone()).unwrap_or_default(),
+            messages: 0,
+            strangers: BTreeMap::new(),
+            rejected: BTreeMap::new(),
+        }
     }
 
     /// Logs what was denied since the last call.
@@ -101,6 +105,13 @@ impl DenialLog {
     }
 }
 
+/// What was denied at the very end is told, too, however the process ends in good order.
+impl Drop for DenialLog {
+    fn drop(&mut self) {
+        self.report();
+    }
+}
+
 /// What is said of a party that is nobody in the fleet.
 #[derive(Debug, PartialEq, Eq)]
 struct Stranger {
@@ -169,7 +180,8 @@ mod tests {
     #[test]
     fn a_certificate_for_nobody_is_named_and_escaped_with_who_there_is() {
         let agents = vec!["airplane-0".to_string(), "airplane-2".into()];
-        let mut log = DenialLog { agents, ..DenialLog::default() };
+        let mut log = DenialLog::default();
+        log.agents.extend(agents);
         for known in ["server", "viewer", "airplane-0", "airplane-2"] {
             assert_eq!(log.count_stranger(known.into(), 9), None, "{known}");
         }

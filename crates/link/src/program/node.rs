@@ -55,6 +55,8 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
         ZenohWire::node_wire(PeerId::Node(agent), &job.connect, credentials.as_ref(), timeout)
             .map_err(endpoint_error)?
             .with_listeners(ports);
+    // From the first link on: what is denied while it joins may be the reason why it does not.
+    let mut denials = DenialLog::new(credentials.as_ref());
     let messenger = Messenger::new(PeerId::Node(agent), Box::new(wire));
     let mut messenger = with_signatures(messenger, credentials.as_ref())?;
     request.session = messenger.session();
@@ -74,7 +76,6 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
     let name = job.agent.clone();
     tracing::info!(agent, who = format!("{} {name}", name.noun), "joined");
     let interrupt = monitor.clone();
-    let mut denials = DenialLog::new(credentials.as_ref());
     let node = Node::new(agent, seat, program, channel, &welcome)
         .with_server_timeout(Duration::from_secs_f64(job.common.lease_s))
         .with_status_listener(move |status| {
