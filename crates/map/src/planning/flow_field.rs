@@ -62,7 +62,7 @@ impl FlowField {
         let here = distance_mod_3(self.code(col, row)?)?;
         let neighbor = self.code(col.wrapping_add_signed(east), row.wrapping_add_signed(north))?;
         let there = distance_mod_3(neighbor)?;
-        Some([0, 1, -1][usize::from((3 + there - here) % 3)])
+        Some(rise_between(here, there))
     }
 
     /// Returns whether the box is one of the goals.
@@ -85,6 +85,19 @@ impl FlowField {
         self.height
     }
 
+    /// Returns the part of `SIDE` x `SIDE` boxes whose lower-left one is in this column and row. It may reach beyond the
+    /// grid: from there no path leads to a goal.
+    pub fn window<const SIDE: usize>(&self, west: i32, south: i32) -> FlowWindow<SIDE> {
+        let mut codes = [[UNREACHABLE; SIDE]; SIDE];
+        for (codes_of_row, row) in codes.iter_mut().zip(south..) {
+            for (code, col) in codes_of_row.iter_mut().zip(west..) {
+                // A number below zero becomes one beyond every grid.
+                *code = self.code(col as u32, row as u32).unwrap_or(UNREACHABLE);
+            }
+        }
+        FlowWindow { codes }
+    }
+
     fn code(&self, col: u32, row: u32) -> Option<u8> {
         if col >= self.width || row >= self.height {
             return None;
@@ -104,7 +117,55 @@ impl FlowField {
     }
 }
 
+/// A square part of a [`FlowField`], for a search that reads each of its boxes many times. Columns and rows are counted
+/// from its lower-left box.
+#[derive(Debug, Clone)]
+pub struct FlowWindow<const SIDE: usize> {
+    codes: [[u8; SIDE]; SIDE],
+}
+
+impl<const SIDE: usize> FlowWindow<SIDE> {
+    /// Returns what [`FlowField::direction`] does.
+    ///
+    /// # Panics
+    /// Outside of the window.
+    #[inline]
+    pub fn direction(&self, col: usize, row: usize) -> Option<u8> {
+        Some(self.codes[row][col]).filter(|&code| code < GOAL).map(|code| code % 4)
+    }
+
+    /// Returns what [`FlowField::rise`] does; `None` at the edge of the window as well.
+    ///
+    /// # Panics
+    /// Outside of the window.
+    #[inline]
+    pub fn rise(&self, col: usize, row: usize, direction: u8) -> Option<i8> {
+        let (east, north) = STEPS[usize::from(direction % 4)];
+        let here = distance_mod_3(self.codes[row][col])?;
+        let next =
+            (col.wrapping_add_signed(east as isize), row.wrapping_add_signed(north as isize));
+        let there = distance_mod_3(*self.codes.get(next.1)?.get(next.0)?)?;
+        Some(rise_between(here, there))
+    }
+
+    /// Returns whether a box is one of the goals.
+    ///
+    /// # Panics
+    /// Outside of the window.
+    #[inline]
+    pub fn is_goal(&self, col: usize, row: usize) -> bool {
+        self.codes[row][col] == GOAL
+    }
+}
+
+/// Returns the difference between two distances that differ by at most one, of which each is known modulo 3.
+#[inline]
+fn rise_between(here: u8, there: u8) -> i8 {
+    [0, 1, -1][usize::from((3 + there - here) % 3)]
+}
+
 /// Returns the distance to the goal modulo 3; `None` without a path.
+#[inline]
 fn distance_mod_3(code: u8) -> Option<u8> {
     match code {
         UNREACHABLE => None,
@@ -185,6 +246,13 @@ mod tests {
                     let rise = distances.steps(col, row).zip(there).map(|(a, b)| (i64::from(b) - i64::from(a)) as i8);
                     prop_assert_eq!(field.rise(col, row, direction), rise);
                 }
+                let window = field.window::<3>(col as i32 - 1, row as i32 - 1);
+                prop_assert_eq!(window.direction(1, 1), field.direction(col, row));
+                prop_assert_eq!(window.is_goal(1, 1), field.is_goal(col, row));
+                for direction in 0..4 {
+                    prop_assert_eq!(window.rise(1, 1, direction), field.rise(col, row, direction));
+                }
+                prop_assert_eq!(window.rise(2, 1, 0), None, "beyond the window");
                 let expected = distances.steps(col, row);
                 prop_assert_eq!(field.reaches_goal(col, row).then_some(steps), expected);
             }

@@ -11,7 +11,7 @@ mod free_space;
 mod octile;
 
 pub use distance::Distances;
-pub use flow_field::FlowField;
+pub use flow_field::{FlowField, FlowWindow};
 pub use free_space::FreeSpace;
 pub use octile::octile_distance;
 

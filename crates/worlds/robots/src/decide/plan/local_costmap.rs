@@ -21,6 +21,20 @@ const MAX_EXACT_BOXES: usize = 2;
 /// of which says only that something is in one of several boxes.
 const RELIABLE_VOTES: i8 = 64;
 
+const LOCAL_BOXES: u32 = (PLAN_SIDE_BOXES * PLAN_SIDE_BOXES) as u32;
+/// All places of the square.
+const ALL_BOXES: u128 = (1 << LOCAL_BOXES) - 1;
+/// The places of the column farthest east.
+const EASTERNMOST: u128 = {
+    let mut column = 0;
+    let mut n = PLAN_SIDE_BOXES as u32 - 1;
+    while n < LOCAL_BOXES {
+        column |= 1 << n;
+        n += PLAN_SIDE_BOXES as u32;
+    }
+    column
+};
+
 /// A set of places around a robot, by the columns and rows from its own place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct LocalBoxSet(u128);
@@ -37,6 +51,16 @@ impl LocalBoxSet {
     /// Returns whether a place is in the set; none outside the square is.
     pub(super) fn contains(self, col: i32, row: i32) -> bool {
         Self::index(col, row).is_some_and(|n| self.0 >> n & 1 == 1)
+    }
+
+    /// Returns the places beside those of the set, to the east, north, west and south.
+    pub(super) fn neighbors(self) -> Self {
+        let east = (self.0 & !EASTERNMOST) << 1;
+        let west = (self.0 & !(EASTERNMOST >> (PLAN_SIDE_BOXES - 1))) >> 1;
+        // What is moved beyond the last row is cut off by the mask, beyond the first one by the word.
+        let north = self.0 << PLAN_SIDE_BOXES & ALL_BOXES;
+        let south = self.0 >> PLAN_SIDE_BOXES;
+        Self(east | north | west | south)
     }
 
     pub(super) fn insert(&mut self, col: i32, row: i32) {

@@ -16,6 +16,7 @@
 
 mod detour;
 mod local_costmap;
+mod local_grid;
 mod memory;
 #[cfg(test)]
 mod tests;
