@@ -62,7 +62,7 @@ impl FlowField {
         let here = distance_mod_3(self.code(col, row)?)?;
         let neighbor = self.code(col.wrapping_add_signed(east), row.wrapping_add_signed(north))?;
         let there = distance_mod_3(neighbor)?;
-        Some(rise_between(here, there))
+        Some([0, 1, -1][usize::from((3 + there - here) % 3)])
     }
 
     /// Returns whether the box is one of the goals.
@@ -134,18 +134,21 @@ impl<const SIDE: usize> FlowWindow<SIDE> {
         Some(self.codes[row][col]).filter(|&code| code < GOAL).map(|code| code % 4)
     }
 
-    /// Returns what [`FlowField::rise`] does; `None` at the edge of the window as well.
+    /// Returns what [`FlowField::rise`] does in each direction.
     ///
     /// # Panics
-    /// Outside of the window.
+    /// At the edge of the window, and outside of it.
     #[inline]
-    pub fn rise(&self, col: usize, row: usize, direction: u8) -> Option<i8> {
-        let (east, north) = STEPS[usize::from(direction % 4)];
-        let here = distance_mod_3(self.codes[row][col])?;
-        let next =
-            (col.wrapping_add_signed(east as isize), row.wrapping_add_signed(north as isize));
-        let there = distance_mod_3(*self.codes.get(next.1)?.get(next.0)?)?;
-        Some(rise_between(here, there))
+    pub fn rises(&self, col: usize, row: usize) -> [Option<i8>; 4] {
+        let distance =
+            |col: usize, row: usize| usize::from(DISTANCE_MOD_3[usize::from(self.codes[row][col])]);
+        let rises = &RISES[distance(col, row)];
+        [
+            rises[distance(col + 1, row)],
+            rises[distance(col, row + 1)],
+            rises[distance(col - 1, row)],
+            rises[distance(col, row - 1)],
+        ]
     }
 
     /// Returns whether a box is one of the goals.
@@ -158,14 +161,18 @@ impl<const SIDE: usize> FlowWindow<SIDE> {
     }
 }
 
-/// Returns the difference between two distances that differ by at most one, of which each is known modulo 3.
-#[inline]
-fn rise_between(here: u8, there: u8) -> i8 {
-    [0, 1, -1][usize::from((3 + there - here) % 3)]
-}
+/// The distance to the goal modulo 3 by code, 3 without a path.
+const DISTANCE_MOD_3: [u8; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 0, 3, 3, 3];
+
+/// The rise by the distances here and there modulo 3, which differ by at most one; 3 is no path.
+const RISES: [[Option<i8>; 4]; 4] = [
+    [Some(0), Some(1), Some(-1), None],
+    [Some(-1), Some(0), Some(1), None],
+    [Some(1), Some(-1), Some(0), None],
+    [None; 4],
+];
 
 /// Returns the distance to the goal modulo 3; `None` without a path.
-#[inline]
 fn distance_mod_3(code: u8) -> Option<u8> {
     match code {
         UNREACHABLE => None,
@@ -249,10 +256,8 @@ mod tests {
                 let window = field.window::<3>(col as i32 - 1, row as i32 - 1);
                 prop_assert_eq!(window.direction(1, 1), field.direction(col, row));
                 prop_assert_eq!(window.is_goal(1, 1), field.is_goal(col, row));
-                for direction in 0..4 {
-                    prop_assert_eq!(window.rise(1, 1, direction), field.rise(col, row, direction));
-                }
-                prop_assert_eq!(window.rise(2, 1, 0), None, "beyond the window");
+                let rises = [0, 1, 2, 3].map(|direction| field.rise(col, row, direction));
+                prop_assert_eq!(window.rises(1, 1), rises);
                 let expected = distances.steps(col, row);
                 prop_assert_eq!(field.reaches_goal(col, row).then_some(steps), expected);
             }

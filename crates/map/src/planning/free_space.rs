@@ -46,6 +46,38 @@ impl FreeSpace {
         col < self.width && row < self.height && self.contains(self.index(col, row))
     }
 
+    /// Returns the part of 32 x 32 boxes whose lower-left one is in this column and row. It may reach beyond the grid,
+    /// where no box is free.
+    pub fn window(&self, west: i32, south: i32) -> FreeWindow {
+        let mut window = FreeWindow { rows: [0; FreeWindow::SIDE] };
+        let first = west.max(0);
+        // At most 32, or less than 1 where none of these columns is in the grid.
+        let count = (i64::from(west) + FreeWindow::SIDE as i64).min(i64::from(self.width))
+            - i64::from(first);
+        if count < 1 {
+            return window;
+        }
+        for (bits, row) in window.rows.iter_mut().zip(south..) {
+            // A number below zero becomes one beyond every grid.
+            if (row as u32) < self.height {
+                let index = self.index(first as u32, row as u32);
+                *bits = self.bits_from(index, count as u32) << (first - west);
+            }
+        }
+        window
+    }
+
+    /// Returns `count` bits from an index on; all of these boxes must be inside the grid, and at most 32.
+    fn bits_from(&self, index: usize, count: u32) -> u32 {
+        let (word, shift) = (index / 64, index % 64);
+        let mut bits = self.bits[word] >> shift;
+        // Twice, because a shift by 64 is none.
+        if let Some(next) = self.bits.get(word + 1) {
+            bits |= next << 1 << (63 - shift);
+        }
+        (bits & ((1 << count) - 1)) as u32
+    }
+
     /// Returns the anchors of a body of `size` x `size` boxes: the boxes that can be the lower-left
     /// one of a square that is free as a whole. A step from one anchor to the next sweeps free
     /// boxes only.
@@ -106,6 +138,28 @@ impl FreeSpace {
     }
 }
 
+/// A square part of a [`FreeSpace`], for what looks at each of its boxes many times. Columns and rows are counted from its
+/// lower-left box.
+#[derive(Debug, Clone)]
+pub struct FreeWindow {
+    /// A bit for each column.
+    rows: [u32; Self::SIDE],
+}
+
+impl FreeWindow {
+    /// Number of its columns, and of its rows.
+    pub const SIDE: usize = 32;
+
+    /// Returns what [`FreeSpace::is_free`] does.
+    ///
+    /// # Panics
+    /// Outside of the window.
+    #[inline]
+    pub fn is_free(&self, col: usize, row: usize) -> bool {
+        self.rows[row] >> col & 1 == 1
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,6 +180,25 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_window_has_the_free_boxes_of_its_place_and_none_beyond_the_grid(
+            width in 1u32..90, height in 1u32..40, west in -40i32..95, south in -40i32..45,
+            walls in any::<[u128; 2]>(),
+        ) {
+            let is_wall = |col: u32, row: u32| {
+                let index = row * width + col;
+                walls[0].rotate_right(index) & walls[1].rotate_right(index / 3) & 1 == 1
+            };
+            let space = FreeSpace::new(width, height, |col, row| !is_wall(col, row));
+            let window = space.window(west, south);
+            for (row, at_row) in (south..).take(FreeWindow::SIDE).enumerate() {
+                for (col, at_col) in (west..).take(FreeWindow::SIDE).enumerate() {
+                    let is_free = space.is_free(at_col as u32, at_row as u32);
+                    prop_assert_eq!(window.is_free(col, row), is_free, "{} {}", at_col, at_row);
+                }
+            }
+        }
+
         #[test]
         fn an_anchor_is_a_box_whose_whole_square_is_free(
             width in 1u32..12, height in 1u32..12, size in 1u32..5, walls in any::<[u128; 2]>(),

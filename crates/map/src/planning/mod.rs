@@ -12,7 +12,7 @@ mod octile;
 
 pub use distance::Distances;
 pub use flow_field::{FlowField, FlowWindow};
-pub use free_space::FreeSpace;
+pub use free_space::{FreeSpace, FreeWindow};
 pub use octile::octile_distance;
 
 /// The four steps on a grid as (columns, rows), by direction: 0 east, 1 north, 2 west, 3 south.

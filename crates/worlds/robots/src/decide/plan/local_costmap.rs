@@ -4,7 +4,7 @@ use super::super::Percept;
 use crate::sensor::{NOTHING, Reading, WALL};
 use crate::world::{MountedSensor, RobotBody};
 use sidestep_error_models::ray::{crossings, turn_crossing};
-use sidestep_map::planning::FreeSpace;
+use sidestep_map::planning::{FreeSpace, FreeWindow};
 use std::sync::Arc;
 
 /// Distance in boxes up to which a robot plans. The square around it then has 81 places, which one word of
@@ -13,7 +13,7 @@ pub(super) const PLAN_RADIUS_BOXES: i32 = 4;
 pub(super) const PLAN_SIDE_BOXES: i32 = 2 * PLAN_RADIUS_BOXES + 1;
 /// Columns and rows, from `-PLAN_RADIUS_BOXES` on, of boxes in which something is looked for. The body
 /// covers boxes east and north of the one from which all are counted, so there must be more on that side.
-const SEARCH_SIDE_BOXES: i32 = 32;
+const SEARCH_SIDE_BOXES: i32 = FreeWindow::SIDE as i32;
 /// Most boxes that one report of a class other than the nearest may block. A class of many boxes with one
 /// thing somewhere in them would wall a corridor off; its boxes are vague instead.
 const MAX_EXACT_BOXES: usize = 2;
@@ -106,6 +106,42 @@ struct BeamBox {
     class: u8,
 }
 
+impl BeamPath {
+    /// Returns the stretch of the beam in which there is something that is not the wall behind it.
+    fn occupied_segment(&self, reading: Reading, free: &FreeWindow) -> Option<OccupiedSegment<'_>> {
+        if reading.observation == NOTHING {
+            return None;
+        }
+        let first = self.crossed.iter().position(|c| c.class >= reading.class)?;
+        let mut end = first;
+        for crossed in &self.crossed {
+            if crossed.is_wall(free) {
+                let explains = crossed.class == reading.class && reading.observation == self.wall;
+                // A report from behind a wall is an error, because no beam goes through.
+                if explains || crossed.class < reading.class {
+                    return None;
+                }
+                break;
+            }
+            if crossed.class > reading.class {
+                break;
+            }
+            end += usize::from(crossed.class == reading.class);
+        }
+        let boxes = &self.crossed[first..end];
+        (!boxes.is_empty()).then_some(OccupiedSegment { boxes, is_near: reading.class == 0 })
+    }
+}
+
+impl BeamBox {
+    /// Returns whether a wall is in the box, by the free boxes that are searched.
+    #[inline(always)]
+    fn is_wall(&self, free: &FreeWindow) -> bool {
+        let (row, col) = OccupancyVotes::index(self);
+        !free.is_free(col, row)
+    }
+}
+
 /// Votes of the beams for and against each box that is looked at being free.
 struct OccupancyVotes([[i8; SEARCH_SIDE_BOXES as usize]; SEARCH_SIDE_BOXES as usize]);
 
@@ -154,18 +190,25 @@ impl BeamModel {
     /// Returns the things that the robot's readings report and the static map does not explain; none
     /// where there are no such things, near or far.
     pub(super) fn local_costmap(&self, percept: &Percept<'_>) -> Option<LocalCostmap> {
+        // On an open floor most robots sense nothing at all.
+        if percept.readings.iter().all(|reading| reading.observation == NOTHING) {
+            return None;
+        }
+        let (col, row) = percept.at;
+        let free =
+            &self.walls.window(col as i32 - PLAN_RADIUS_BOXES, row as i32 - PLAN_RADIUS_BOXES);
         // Mostly nothing unknown is there, and then the free boxes need not be found.
-        self.occupied_segments(percept).next()?;
+        self.occupied_segments(percept, free).next()?;
         let mut votes = OccupancyVotes::default();
         for (beam, &reading) in self.reports(percept) {
-            self.vote_free(beam, reading, percept.at, &mut votes);
+            self.vote_free(beam, reading, free, &mut votes);
         }
-        for segment in self.occupied_segments(percept) {
+        for segment in self.occupied_segments(percept, free) {
             segment.boxes.iter().for_each(|crossed| votes.add(crossed, -1));
         }
         // Only now, because a box is free or not by the votes of all beams.
         let mut costmap = LocalCostmap::default();
-        for segment in self.occupied_segments(percept) {
+        for segment in self.occupied_segments(percept, free) {
             let occupied = segment.boxes.iter().filter(|crossed| !votes.is_free(crossed));
             let is_exact = segment.is_near || occupied.clone().count() <= MAX_EXACT_BOXES;
             let places = if is_exact { &mut costmap.blocked } else { &mut costmap.vague };
@@ -188,44 +231,10 @@ impl BeamModel {
     fn occupied_segments<'a>(
         &'a self,
         percept: &'a Percept<'_>,
+        free: &'a FreeWindow,
     ) -> impl Iterator<Item = OccupiedSegment<'a>> {
         let reports = self.reports(percept);
-        reports.filter_map(move |(beam, &reading)| self.occupied_segment(beam, reading, percept.at))
-    }
-
-    fn is_wall(&self, (col, row): (u32, u32), crossed: &BeamBox) -> bool {
-        let at = (col.wrapping_add_signed(crossed.col), row.wrapping_add_signed(crossed.row));
-        !self.walls.is_free(at.0, at.1)
-    }
-
-    /// Returns the stretch of a beam in which there is something that is not the wall behind it.
-    fn occupied_segment<'a>(
-        &self,
-        beam: &'a BeamPath,
-        reading: Reading,
-        at: (u32, u32),
-    ) -> Option<OccupiedSegment<'a>> {
-        if reading.observation == NOTHING {
-            return None;
-        }
-        let first = beam.crossed.iter().position(|c| c.class >= reading.class)?;
-        let mut end = first;
-        for crossed in &beam.crossed {
-            if self.is_wall(at, crossed) {
-                let explains = crossed.class == reading.class && reading.observation == beam.wall;
-                // A report from behind a wall is an error, because no beam goes through.
-                if explains || crossed.class < reading.class {
-                    return None;
-                }
-                break;
-            }
-            if crossed.class > reading.class {
-                break;
-            }
-            end += usize::from(crossed.class == reading.class);
-        }
-        let boxes = &beam.crossed[first..end];
-        (!boxes.is_empty()).then_some(OccupiedSegment { boxes, is_near: reading.class == 0 })
+        reports.filter_map(|(beam, &reading)| beam.occupied_segment(reading, free))
     }
 
     /// Votes for the boxes that a beam has passed: all up to the wall if it reports nothing or that
@@ -235,10 +244,10 @@ impl BeamModel {
         &self,
         beam: &BeamPath,
         reading: Reading,
-        at: (u32, u32),
+        free: &FreeWindow,
         votes: &mut OccupancyVotes,
     ) {
-        let to_wall = beam.crossed.iter().position(|crossed| self.is_wall(at, crossed));
+        let to_wall = beam.crossed.iter().position(|crossed| crossed.is_wall(free));
         let wall_reading =
             to_wall.map(|n| Reading { observation: beam.wall, class: beam.crossed[n].class });
         let is_clear = reading.observation == NOTHING || wall_reading == Some(reading);

@@ -43,7 +43,7 @@ impl LocalGrid {
         for row in 1..=PLAN_SIDE {
             for col in 1..=PLAN_SIDE {
                 let n = row * SIDE + col;
-                let rises = [0, 1, 2, 3].map(|direction| flow.rise(col, row, direction));
+                let rises = flow.rises(col, row);
                 grid.left_lanes[n] = left_lanes(rises);
                 grid.rises[n] = within_square(rises, col, row);
                 let offset = box_offset(col, row);
@@ -72,13 +72,15 @@ pub(super) fn neighbor(n: usize, direction: u8) -> usize {
 
 /// Returns the directions in which a place is in the left lane, a bit each.
 fn left_lanes(rises: [Option<i8>; 4]) -> u8 {
-    let is_wall = rises.map(|rise| rise.is_none());
-    let mut lanes = 0;
-    for direction in 0..4 {
-        let is_lane = is_wall[(direction + 1) % 4] && !is_wall[(direction + 3) % 4];
-        lanes |= u8::from(is_lane) << direction;
+    let mut walls = 0;
+    for (direction, rise) in rises.iter().enumerate() {
+        walls |= u8::from(rise.is_none()) << direction;
     }
-    lanes
+    // Twice the four bits, so that a turn is a shift.
+    let walls = walls | walls << 4;
+    let is_wall_left = walls >> 1;
+    let is_wall_right = walls >> 3;
+    is_wall_left & !is_wall_right & 0b1111
 }
 
 /// Returns the rises of a place without those of steps out of the planned square.
