@@ -5,7 +5,7 @@ use crate::support::{CommandOutput, TestFolder, names, signal, stop, wait_for};
 use std::path::PathBuf;
 use std::process::Child;
 
-/// An export that takes some seconds: it draws 150 pictures.
+/// An export that takes some seconds: it draws a picture of every fourth cycle.
 const EXPORT: [&str; 6] = ["export", "r", "--to", "mp4-frames", "--out", "film"];
 
 /// Number of cycles of which an export takes some seconds in any form.

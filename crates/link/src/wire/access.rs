@@ -3,10 +3,10 @@
 //!
 //! A key names sender, receiver and the receiver's session, `sidestep/FROM/TO/SESSION`. It is published for whatever
 //! session, `sidestep/FROM/TO/*`, and each session subscribes to a key that no other one has: Zenoh (1.10) keeps what it
-//! knows of a closed connection, some kilobytes, for as long as anyone else has subscribed to one of its keys. A node may
-//! publish under its own name only, and receive only
-//! what is for it or for all nodes; queries for views are for viewers. Zenoh drops what is denied and says so only in its
-//! most detailed log: [`DenialLayer`] counts that.
+//! knows of a closed connection, some kilobytes, for as long as anyone else has subscribed to one of its keys.
+//!
+//! A node may publish under its own name only, and receive only what is for it or for all nodes; queries for views are for
+//! viewers. Zenoh drops what is denied and says so only in its most detailed log: [`DenialLayer`] counts that.
 
 use crate::identity::{SERVER_NAME, VIEWER_NAME};
 use crate::peer::PeerId;

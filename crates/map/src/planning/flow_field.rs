@@ -59,10 +59,9 @@ impl FlowField {
     /// or 1. `None` where no path leads from one of the two boxes to a goal.
     pub fn rise(&self, col: u32, row: u32, direction: u8) -> Option<i8> {
         let (east, north) = STEPS[usize::from(direction % 4)];
-        let here = distance_mod_3(self.code(col, row)?)?;
-        let neighbor = self.code(col.wrapping_add_signed(east), row.wrapping_add_signed(north))?;
-        let there = distance_mod_3(neighbor)?;
-        Some([0, 1, -1][usize::from((3 + there - here) % 3)])
+        let here = self.code(col, row)?;
+        let there = self.code(col.wrapping_add_signed(east), row.wrapping_add_signed(north))?;
+        RISES[distance_mod_3(here)][distance_mod_3(there)]
     }
 
     /// Returns whether the box is one of the goals.
@@ -140,8 +139,7 @@ impl<const SIDE: usize> FlowWindow<SIDE> {
     /// At the edge of the window, and outside of it.
     #[inline]
     pub fn rises(&self, col: usize, row: usize) -> [Option<i8>; 4] {
-        let distance =
-            |col: usize, row: usize| usize::from(DISTANCE_MOD_3[usize::from(self.codes[row][col])]);
+        let distance = |col: usize, row: usize| distance_mod_3(self.codes[row][col]);
         let rises = &RISES[distance(col, row)];
         [
             rises[distance(col + 1, row)],
@@ -161,7 +159,7 @@ impl<const SIDE: usize> FlowWindow<SIDE> {
     }
 }
 
-/// The distance to the goal modulo 3 by code, 3 without a path.
+/// See [`distance_mod_3`].
 const DISTANCE_MOD_3: [u8; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 0, 3, 3, 3];
 
 /// The rise by the distances here and there modulo 3, which differ by at most one; 3 is no path.
@@ -172,13 +170,10 @@ const RISES: [[Option<i8>; 4]; 4] = [
     [None; 4],
 ];
 
-/// Returns the distance to the goal modulo 3; `None` without a path.
-fn distance_mod_3(code: u8) -> Option<u8> {
-    match code {
-        UNREACHABLE => None,
-        GOAL => Some(0),
-        _ => Some(code / 4),
-    }
+/// Returns the distance to the goal modulo 3 by the code of a box; 3 without a path.
+#[inline]
+fn distance_mod_3(code: u8) -> usize {
+    usize::from(DISTANCE_MOD_3[usize::from(code)])
 }
 
 fn code(distances: &Distances, col: u32, row: u32) -> u8 {

@@ -71,7 +71,7 @@ impl FreeSpace {
     fn bits_from(&self, index: usize, count: u32) -> u32 {
         let (word, shift) = (index / 64, index % 64);
         let mut bits = self.bits[word] >> shift;
-        // Twice, because a shift by 64 is none.
+        // In two steps, because 64 bits cannot be shifted by 64.
         if let Some(next) = self.bits.get(word + 1) {
             bits |= next << 1 << (63 - shift);
         }

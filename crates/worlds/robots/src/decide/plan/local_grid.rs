@@ -135,8 +135,11 @@ mod tests {
     fn view(field: &FlowField, at: (u32, u32), blocked: u128, vague: u128) -> LocalView<'_> {
         let [blocked, vague] = [blocked, vague].map(|bits| {
             let mut places = LocalBoxSet::default();
-            for n in (0..81).filter(|n| bits >> n & 1 == 1) {
-                places.insert(n % PLAN_SIDE_BOXES - 4, n / PLAN_SIDE_BOXES - 4);
+            let square = PLAN_SIDE_BOXES * PLAN_SIDE_BOXES;
+            for n in (0..square).filter(|n| bits >> n & 1 == 1) {
+                let row = n / PLAN_SIDE_BOXES;
+                let col = n % PLAN_SIDE_BOXES;
+                places.insert(col - PLAN_RADIUS_BOXES, row - PLAN_RADIUS_BOXES);
             }
             places
         });
