@@ -69,7 +69,8 @@ impl FreeSpace {
 
     /// Returns `count` bits from an index on; all of these boxes must be inside the grid, and at most 32.
     fn bits_from(&self, index: usize, count: u32) -> u32 {
-        let (word, shift) = (index / 64, index % 64);
+        let word = index / 64;
+        let shift = index % 64;
         let mut bits = self.bits[word] >> shift;
         // In two steps, because 64 bits cannot be shifted by 64.
         if let Some(next) = self.bits.get(word + 1) {

@@ -2,6 +2,7 @@
 
 use super::LocalView;
 use super::local_grid::{CENTER, GRID_BOXES, LocalGrid, neighbor};
+use super::step_costs::StepCosts;
 
 /// Price of a first step away from the goal that goes straight back, or gives up a sidestep. It is
 /// there because a robot sees little of a wide obstacle, and would otherwise go to and fro before it.
@@ -9,21 +10,6 @@ const CHANGE_COST: u16 = 4;
 const INFINITE_COST: u16 = u16::MAX;
 /// Stands for the direction of the first step at the start, where none has been made.
 const NO_DIRECTION: u8 = 4;
-
-/// Prices of a search, in actions.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct StepCosts {
-    /// Price of a place that is blocked now; the obstacle may go away.
-    pub(super) blocked: u16,
-    /// Extra price of a place beside a blocked one, where a slip ends in a contact.
-    pub(super) beside: u16,
-    /// Extra price of a place where something may be.
-    pub(super) vague: u16,
-    /// Direction of the last step; none before the first.
-    pub(super) moved: Option<u8>,
-    /// Whether that step did not lead nearer to the goal, so that it belongs to a detour.
-    pub(super) is_sidestep: bool,
-}
 
 /// The cheapest path found so far to a place.
 #[derive(Debug, Clone, Copy)]
@@ -106,18 +92,6 @@ fn relax_neighbors(
         }
     }
     changed
-}
-
-impl StepCosts {
-    /// Returns whether a step in a direction goes back, or gives up the last step if that was a sidestep.
-    fn is_change_of_course(self, direction: u8) -> bool {
-        let Some(moved) = self.moved else { return false };
-        match (4 + direction - moved) % 4 {
-            0 => false,
-            2 => true,
-            _ => self.is_sidestep,
-        }
-    }
 }
 
 fn quarter_turns(turn: u8) -> u16 {

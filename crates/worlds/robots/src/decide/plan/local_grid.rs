@@ -1,8 +1,8 @@
 //! The places around a robot, with what a search reads of each of them many times.
 
 use super::LocalView;
-use super::detour::StepCosts;
 use super::local_costmap::{PLAN_RADIUS_BOXES, PLAN_SIDE_BOXES};
+use super::step_costs::StepCosts;
 use crate::effector::HEADINGS;
 use sidestep_map::planning::FlowWindow;
 
@@ -31,7 +31,8 @@ impl LocalGrid {
     pub(super) fn new(view: &LocalView<'_>, prices: StepCosts) -> Self {
         let reach = PLAN_RADIUS_BOXES + 1;
         // Places on a grid of less than 2^31 boxes a side; some lie outside of it.
-        let (west, south) = (view.at.0 as i32 - reach, view.at.1 as i32 - reach);
+        let west = view.at.0 as i32 - reach;
+        let south = view.at.1 as i32 - reach;
         let flow = view.field.window::<SIDE>(west, south);
         let mut grid = Self {
             rises: [[None; 4]; GRID_BOXES],

@@ -18,6 +18,7 @@ mod detour;
 mod local_costmap;
 mod local_grid;
 mod memory;
+mod step_costs;
 #[cfg(test)]
 mod tests;
 
@@ -26,12 +27,12 @@ use super::{Memory, Percept};
 use crate::effector::{ActionId, FORWARD, HEADINGS, LEFT, RIGHT, STAY};
 use crate::sensor::WALL;
 use crate::world::RobotBody;
-use detour::StepCosts;
 use local_costmap::{BeamModel, LocalBoxSet, LocalCostmap};
 use memory::PlannerMemory;
 use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::{FlowField, FreeSpace};
 use std::sync::Arc;
+use step_costs::StepCosts;
 
 /// Actions without progress after which a robot strays, at least; its rank adds up to 31, so that
 /// not all stray at once. A queue before a narrow passage makes no progress for long either, and must
