@@ -1,6 +1,6 @@
 //! Number of steps to the nearest goal, by breadth-first search.
 
-use super::{FreeSpace, STEPS};
+use super::{FreeSpace, Lanes, OFF_LANE_COST, STEPS};
 
 /// The number of 4-connected steps from every box of a grid to the nearest goal.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,6 +39,66 @@ impl Distances {
             distances.expand(anchors, position, &mut queue);
         }
         distances
+    }
+
+    /// Computes the cost to the nearest goal of paths on which a step costs 1, and [`OFF_LANE_COST`] more where it leads
+    /// off lane and not to a goal.
+    ///
+    /// # Panics
+    /// When `size` is 0, or where the lanes are those of another grid.
+    pub(super) fn along_lanes(
+        free: &FreeSpace,
+        size: u32,
+        goals: &[(u32, u32)],
+        lanes: &Lanes,
+    ) -> Self {
+        let anchors = free.anchors(size);
+        let mut distances = Self {
+            width: anchors.width(),
+            height: anchors.height(),
+            steps: vec![Self::UNREACHABLE; anchors.len()],
+        };
+        // Dijkstra's search with a queue for each cost that a step can lead to.
+        let mut queues: [Vec<(u32, u32)>; OFF_LANE_COST as usize + 2] = Default::default();
+        queues[0] = distances.insert_goals(&anchors, goals);
+        let mut cost = 0;
+        while queues.iter().any(|queue| !queue.is_empty()) {
+            for at in std::mem::take(&mut queues[0]) {
+                // A place can be queued again at a lower cost, which was its turn then.
+                if distances.steps[anchors.index(at.0, at.1)] == cost {
+                    distances.expand_along_lanes(&anchors, lanes, at, &mut queues);
+                }
+            }
+            queues.rotate_left(1);
+            cost += 1;
+        }
+        distances
+    }
+
+    /// Lowers the cost of the neighbors from which a step leads to a box, and queues them by how much more it is.
+    fn expand_along_lanes(
+        &mut self,
+        anchors: &FreeSpace,
+        lanes: &Lanes,
+        at: (u32, u32),
+        queues: &mut [Vec<(u32, u32)>],
+    ) {
+        let cost = self.steps[anchors.index(at.0, at.1)];
+        for (direction, (east, north)) in (0..).zip(STEPS) {
+            // The step leads from there to here.
+            let col = at.0.wrapping_add_signed(-east);
+            let row = at.1.wrapping_add_signed(-north);
+            if !anchors.is_free(col, row) {
+                continue;
+            }
+            let off_lane = u32::from(cost > 0 && lanes.is_off_lane(at.0, at.1, direction));
+            let step = 1 + u32::from(OFF_LANE_COST) * off_lane;
+            let known = &mut self.steps[anchors.index(col, row)];
+            if cost + step < *known {
+                *known = cost + step;
+                queues[step as usize].push((col, row));
+            }
+        }
     }
 
     /// Returns the steps from a box to the nearest goal, or `None` where no path leads to one.

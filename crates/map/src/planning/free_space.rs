@@ -2,6 +2,9 @@
 
 use crate::{Cell, GridMap};
 
+/// Number of columns of a [`FreeWindow`]: the bits of a word.
+pub const FREE_WINDOW_COLUMNS: usize = 32;
+
 /// The set of boxes of a grid where a body may stand.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FreeSpace {
@@ -46,13 +49,14 @@ impl FreeSpace {
         col < self.width && row < self.height && self.contains(self.index(col, row))
     }
 
-    /// Returns the part of 32 x 32 boxes whose lower-left one is in this column and row. It may reach beyond the grid,
-    /// where no box is free.
-    pub fn window(&self, west: i32, south: i32) -> FreeWindow {
-        let mut window = FreeWindow { rows: [0; FreeWindow::SIDE] };
+    /// Returns the part of 32 columns and `ROWS` rows whose lower-left box is in this column and row. It may reach beyond
+    /// the grid, where no box is free.
+    #[inline]
+    pub fn window<const ROWS: usize>(&self, west: i32, south: i32) -> FreeWindow<ROWS> {
+        let mut window = FreeWindow { rows: [0; ROWS] };
         let first = west.max(0);
         // At most 32, or less than 1 where none of these columns is in the grid.
-        let count = (i64::from(west) + FreeWindow::SIDE as i64).min(i64::from(self.width))
+        let count = (i64::from(west) + FREE_WINDOW_COLUMNS as i64).min(i64::from(self.width))
             - i64::from(first);
         if count < 1 {
             return window;
@@ -142,15 +146,12 @@ impl FreeSpace {
 /// A square part of a [`FreeSpace`], for what looks at each of its boxes many times. Columns and rows are counted from its
 /// lower-left box.
 #[derive(Debug, Clone)]
-pub struct FreeWindow {
+pub struct FreeWindow<const ROWS: usize> {
     /// A bit for each column.
-    rows: [u32; Self::SIDE],
+    rows: [u32; ROWS],
 }
 
-impl FreeWindow {
-    /// Number of its columns, and of its rows.
-    pub const SIDE: usize = 32;
-
+impl<const ROWS: usize> FreeWindow<ROWS> {
     /// Returns what [`FreeSpace::is_free`] does.
     ///
     /// # Panics
@@ -158,6 +159,15 @@ impl FreeWindow {
     #[inline]
     pub fn is_free(&self, col: usize, row: usize) -> bool {
         self.rows[row] >> col & 1 == 1
+    }
+
+    /// Returns the free boxes of a row, a bit each from the west.
+    ///
+    /// # Panics
+    /// Outside of the window.
+    #[inline]
+    pub fn row(&self, row: usize) -> u32 {
+        self.rows[row]
     }
 }
 
@@ -191,11 +201,12 @@ mod tests {
                 walls[0].rotate_right(index) & walls[1].rotate_right(index / 3) & 1 == 1
             };
             let space = FreeSpace::new(width, height, |col, row| !is_wall(col, row));
-            let window = space.window(west, south);
-            for (row, at_row) in (south..).take(FreeWindow::SIDE).enumerate() {
-                for (col, at_col) in (west..).take(FreeWindow::SIDE).enumerate() {
+            let window = space.window::<20>(west, south);
+            for (row, at_row) in (south..).take(20).enumerate() {
+                for (col, at_col) in (west..).take(FREE_WINDOW_COLUMNS).enumerate() {
                     let is_free = space.is_free(at_col as u32, at_row as u32);
                     prop_assert_eq!(window.is_free(col, row), is_free, "{} {}", at_col, at_row);
+                    prop_assert_eq!(window.row(row) >> col & 1 == 1, is_free);
                 }
             }
         }

@@ -1,18 +1,20 @@
 //! Distances and shortest paths on a grid of boxes.
 //!
 //! [`FreeSpace`] holds the boxes where a body may stand, [`Distances`] the number of steps to the
-//! nearest goal, and [`FlowField`] the direction of the next step; [`octile_distance`] is the
+//! nearest goal, [`FlowField`] the direction of the next step, [`Lanes`] the right-hand side of passages; [`octile_distance`] is the
 //! measure of the MovingAI benchmarks. Everything here is a pure function of its arguments; ties
 //! are broken by documented rules.
 
 mod distance;
 mod flow_field;
 mod free_space;
+mod lanes;
 mod octile;
 
 pub use distance::Distances;
-pub use flow_field::{FlowField, FlowWindow};
-pub use free_space::{FreeSpace, FreeWindow};
+pub use flow_field::{FlowField, FlowWindow, OFF_LANE_COST};
+pub use free_space::{FREE_WINDOW_COLUMNS, FreeSpace, FreeWindow};
+pub use lanes::Lanes;
 pub use octile::octile_distance;
 
 /// The four steps on a grid as (columns, rows), by direction: 0 east, 1 north, 2 west, 3 south.

@@ -1,99 +1,226 @@
 //! The cheapest path through the places around a robot, to where the path of the static map goes on.
 
-use super::LocalView;
-use super::local_grid::{CENTER, GRID_BOXES, LocalGrid, neighbor};
+use super::local_box_set::LocalBoxSet;
+use super::local_grid::{EXIT_LEVELS, LocalGrid};
+use super::local_view::LocalView;
 use super::step_costs::StepCosts;
+use crate::effector::HEADINGS;
 
-/// Price of a first step away from the goal that goes straight back, or gives up a sidestep. It is
-/// there because a robot sees little of a wide obstacle, and would otherwise go to and fro before it.
-const CHANGE_COST: u16 = 4;
-const INFINITE_COST: u16 = u16::MAX;
-/// Stands for the direction of the first step at the start, where none has been made.
-const NO_DIRECTION: u8 = 4;
-
-/// The cheapest path found so far to a place.
-#[derive(Debug, Clone, Copy)]
-struct Label {
-    cost: u16,
-    /// Distance to the goal on the static map, less that of the robot's own place.
-    rise: i16,
-    /// Direction of the first step.
-    first: u8,
-    /// Direction of the last one.
-    last: u8,
-}
+/// Number of costs that a search looks ahead, more than that of any step; a power of two.
+const PENDING_LEVELS: usize = 64;
 
 /// Returns the direction of the first step; none where walls leave no way out.
+///
+/// Dijkstra's search backward from the exits, over places and headings. All places of one cost and heading are one word,
+/// so that a step of all of them is a shift.
 pub(super) fn first_step(view: &LocalView<'_>, prices: StepCosts) -> Option<u8> {
-    let grid = LocalGrid::new(view, prices);
-    let start = Label { cost: 0, rise: 0, first: NO_DIRECTION, last: view.heading };
-    let mut labels = [Label { cost: INFINITE_COST, ..start }; GRID_BOXES];
-    labels[CENTER] = start;
-    // Label correcting in rounds, because the set of all places fits into one word.
-    let mut waiting = 1u128 << CENTER;
-    let mut next = 0u128;
-    while waiting != 0 {
-        let n = waiting.trailing_zeros() as usize;
-        waiting &= waiting - 1;
-        next |= relax_neighbors(&grid, prices, &mut labels, n);
-        if waiting == 0 {
-            waiting = std::mem::take(&mut next);
+    let grid = LocalGrid::new(view, prices)?;
+    let mut search = Search {
+        grid: &grid,
+        off_lane: usize::from(prices.off_lane),
+        pending: [[LocalBoxSet::default(); 4]; PENDING_LEVELS],
+        settled: [LocalBoxSet::default(); 4],
+        last_level: 0,
+    };
+    let mut best: Option<(usize, u8)> = None;
+    let mut level = 0;
+    while level <= search.last_level || level < EXIT_LEVELS {
+        let settled = search.settle(level);
+        for turn in TURNS {
+            let direction = (view.heading + turn) % 4;
+            let (east, north) = HEADINGS[usize::from(direction)];
+            if !settled[usize::from(direction)].contains(east, north) {
+                continue;
+            }
+            let cost = level + first_cost(view, &grid, prices, direction);
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, direction));
+            }
         }
+        // What is settled later costs at least a step from a cost above this one.
+        if best.is_some_and(|(least, _)| least <= level + 2) {
+            break;
+        }
+        level += 1;
     }
-    best_exit(&grid, &labels, view.heading)
+    best.map(|(_, direction)| direction)
 }
 
-/// Returns the direction of the first step to the best place at which the path of the static map goes on.
-fn best_exit(grid: &LocalGrid, labels: &[Label; GRID_BOXES], heading: u8) -> Option<u8> {
-    let mut best: Option<((i32, bool), u8)> = None;
-    let mut exits = grid.exits & !(1 << CENTER);
-    while exits != 0 {
-        let label = labels[exits.trailing_zeros() as usize];
-        exits &= exits - 1;
-        if label.cost == INFINITE_COST {
-            continue;
-        }
-        // The rest of the path, beyond the exit, costs one action a box: the rise is how much longer it is
-        // than from here. Of equal exits one straight ahead saves a turn.
-        let whole_cost = i32::from(label.cost) + i32::from(label.rise);
-        let key = (whole_cost, label.first != heading);
-        if best.is_none_or(|(least, _)| key < least) {
-            best = Some((key, label.first));
-        }
-    }
-    best.map(|(_, first)| first)
+/// The first step ahead, then to the right: of equal ones the first is kept, and robots that meet head on both keep to the
+/// right.
+const TURNS: [u8; 4] = [0, 3, 1, 2];
+
+/// Returns the cost of the first step, with the turns before it.
+fn first_cost(view: &LocalView<'_>, grid: &LocalGrid, prices: StepCosts, direction: u8) -> usize {
+    let (east, north) = HEADINGS[usize::from(direction)];
+    let turn = (4 + direction - view.heading) % 4;
+    let turns = u16::from(turn.min(4 - turn));
+    let is_away = view.rise(direction).is_some_and(|rise| rise >= 0);
+    let change = prices.change_of_course(direction, is_away);
+    let off_lane = grid.off_lane[usize::from(direction)].contains(east, north);
+    let lane = prices.off_lane * u16::from(off_lane);
+    usize::from(turns + 1 + change + lane + grid.price((east, north)))
 }
 
-/// Spreads a label to the neighbors of its place, and returns those that have changed.
-fn relax_neighbors(
-    grid: &LocalGrid,
-    prices: StepCosts,
-    labels: &mut [Label; GRID_BOXES],
-    n: usize,
-) -> u128 {
-    let from = labels[n];
-    let is_first = from.first == NO_DIRECTION;
-    let mut changed = 0;
-    // First ahead, then to the right: of equal paths the first is kept, and robots that meet head on
-    // both keep to the right.
-    for turn in [0, 3, 1, 2] {
-        let direction = (from.last + turn) % 4;
-        let Some(rise) = grid.rises[n][usize::from(direction)] else { continue };
-        let next = neighbor(n, direction);
-        let is_change = is_first && rise >= 0 && prices.is_change_of_course(direction);
-        let change = if is_change { CHANGE_COST } else { 0 };
-        let lane = u16::from(grid.left_lanes[next] >> direction & 1);
-        let cost = from.cost + 1 + quarter_turns(turn) + change + lane + grid.costs[next];
-        if cost < labels[next].cost {
-            let first = if is_first { direction } else { from.first };
-            labels[next] =
-                Label { cost, rise: from.rise + i16::from(rise), first, last: direction };
-            changed |= 1 << next;
-        }
-    }
-    changed
+struct Search<'a> {
+    grid: &'a LocalGrid,
+    /// Extra price of a place that is off lane.
+    off_lane: usize,
+    /// Places and headings that are reached at a cost, by the cost modulo the number of levels.
+    pending: [[LocalBoxSet; 4]; PENDING_LEVELS],
+    /// Those that have been reached at any cost before, by heading.
+    settled: [LocalBoxSet; 4],
+    /// Highest cost at which something is pending.
+    last_level: usize,
 }
 
-fn quarter_turns(turn: u8) -> u16 {
-    u16::from(turn.min(4 - turn))
+impl Search<'_> {
+    /// Settles the places of a cost, and returns those of each heading.
+    fn settle(&mut self, level: usize) -> [LocalBoxSet; 4] {
+        let mut reached = std::mem::take(&mut self.pending[level % PENDING_LEVELS]);
+        let exits = self.grid.exits.get(level).copied().unwrap_or_default();
+        for (heading, places) in reached.iter_mut().enumerate() {
+            *places = places.union(exits).without(self.settled[heading]);
+            self.settled[heading] = self.settled[heading].union(*places);
+        }
+        for (heading, &places) in (0..).zip(&reached) {
+            if !places.is_empty() {
+                self.reach_from(level, heading, places);
+            }
+        }
+        reached
+    }
+
+    /// Adds what leads to these places: a turn on the spot, and a step from the place behind.
+    fn reach_from(&mut self, level: usize, heading: u8, places: LocalBoxSet) {
+        self.add(level + 1, heading + 1, places);
+        self.add(level + 1, heading + 3, places);
+        let off_lane = self.grid.off_lane[usize::from(heading)];
+        for &(priced, price) in &self.grid.prices {
+            let of_price = places.intersection(priced);
+            if of_price.is_empty() {
+                continue;
+            }
+            let cost = level + 1 + usize::from(price);
+            let behind = |set: LocalBoxSet| set.shift(heading + 2).intersection(self.grid.open);
+            let on_lane = behind(of_price.without(off_lane));
+            let off_lane = behind(of_price.intersection(off_lane));
+            self.add(cost, heading, on_lane);
+            self.add(cost + self.off_lane, heading, off_lane);
+        }
+    }
+
+    fn add(&mut self, level: usize, heading: u8, places: LocalBoxSet) {
+        let heading = usize::from(heading % 4);
+        let fresh = places.without(self.settled[heading]);
+        if !fresh.is_empty() {
+            let pending = &mut self.pending[level % PENDING_LEVELS][heading];
+            *pending = pending.union(fresh);
+            self.last_level = self.last_level.max(level);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use sidestep_map::planning::{FlowField, FreeSpace, Lanes};
+    use std::sync::Arc;
+
+    const SIDE: u32 = 14;
+
+    /// Returns the least cost over all first steps in a direction, by going over places and headings until no cost
+    /// falls any more.
+    fn least_cost(view: &LocalView<'_>, grid: &LocalGrid, prices: StepCosts, first: u8) -> usize {
+        let mut costs = [[usize::MAX; 4]; 81];
+        let number = |(col, row): (i32, i32)| ((row + 4) * 9 + col + 4) as usize;
+        for (level, places) in grid.exits.iter().enumerate() {
+            places.places().for_each(|at| costs[number(at)] = [level; 4]);
+        }
+        let price = |at: (i32, i32), heading: u8| {
+            let is_off = grid.off_lane[usize::from(heading)].contains(at.0, at.1);
+            1 + usize::from(grid.price(at)) + usize::from(prices.off_lane) * usize::from(is_off)
+        };
+        let mut is_falling = true;
+        while is_falling {
+            is_falling = false;
+            for at in LocalBoxSet::ALL.places() {
+                for heading in 0..4u8 {
+                    let here = usize::from(heading);
+                    let (east, north) = HEADINGS[here];
+                    let next = (at.0 + east, at.1 + north);
+                    let mut cost = costs[number(at)][here];
+                    for turned in [(heading + 1) % 4, (heading + 3) % 4] {
+                        cost = cost.min(costs[number(at)][usize::from(turned)].saturating_add(1));
+                    }
+                    if grid.open.contains(at.0, at.1) && LocalBoxSet::ALL.contains(next.0, next.1) {
+                        let there = costs[number(next)][here];
+                        cost = cost.min(there.saturating_add(price(next, heading)));
+                    }
+                    is_falling |= cost < costs[number(at)][here];
+                    costs[number(at)][here] = cost;
+                }
+            }
+        }
+        let (east, north) = HEADINGS[usize::from(first)];
+        let there = costs[number((east, north))][usize::from(first)];
+        there.saturating_add(first_cost(view, grid, prices, first))
+    }
+
+    proptest! {
+        #[test]
+        fn the_first_step_begins_a_path_of_the_least_cost(
+            walls in any::<[u128; 3]>(), goal in (0..SIDE, 0..SIDE), at in (0..SIDE, 0..SIDE), heading in 0u8..4,
+            blocked in any::<[u128; 3]>(), vague in any::<[u128; 2]>(), moved in 0u8..5, is_sidestep: bool,
+        ) {
+            let is_wall = |col, row| walls.iter().all(|w| w.rotate_right(row * 15 + col) & 1 == 1);
+            let free = FreeSpace::new(SIDE, SIDE, |col, row| !is_wall(col, row));
+            let lanes = Arc::new(Lanes::new(&free, 1));
+            let field = FlowField::along_lanes(&free, 1, &[goal], &lanes);
+            let sets = [blocked[0] & blocked[1] & blocked[2], vague[0] & vague[1]];
+            let [blocked, vague] = sets.map(|bits| LocalBoxSet::from_rows(|row| (bits >> (9 * row)) as u32));
+            let moved = moved.checked_sub(1);
+            let prices = StepCosts { blocked: 31, beside: 6, vague: 5, off_lane: 8, is_on_detour: false, moved, is_sidestep };
+            let view =
+                LocalView { field: &field, at, heading, blocked, vague, is_careful: true, is_done: false, is_alone: false };
+            let step = first_step(&view, prices);
+            let Some(grid) = LocalGrid::new(&view, prices) else {
+                prop_assert_eq!(step, None);
+                return Ok(());
+            };
+            let costs = [0, 1, 2, 3].map(|direction| least_cost(&view, &grid, prices, direction));
+            let least = costs.into_iter().min().filter(|&cost| cost < usize::MAX);
+            prop_assert_eq!(step.map(|direction| costs[usize::from(direction)]), least, "{:?}", costs);
+        }
+    }
+
+    #[test]
+    fn head_on_a_robot_keeps_to_the_right() {
+        let free = FreeSpace::new(40, 20, |_, _| true);
+        let field = FlowField::to_nearest(&free, 1, &[(39, 10)]);
+        let mut blocked = LocalBoxSet::default();
+        blocked.insert(1, 0);
+        let vague = LocalBoxSet::default();
+        let view = LocalView {
+            field: &field,
+            at: (10, 10),
+            heading: 0,
+            blocked,
+            vague,
+            is_careful: false,
+            is_done: false,
+            is_alone: false,
+        };
+        let prices = StepCosts {
+            blocked: 20,
+            beside: 1,
+            vague: 1,
+            off_lane: 8,
+            is_on_detour: false,
+            moved: None,
+            is_sidestep: false,
+        };
+        assert_eq!(first_step(&view, prices), Some(3));
+    }
 }

@@ -1,74 +1,28 @@
 //! Boxes that beams report: the places around a robot where it cannot stand now.
 
 use super::super::Percept;
+use super::local_box_set::{LocalBoxSet, PLAN_RADIUS_BOXES};
+use crate::effector::HEADINGS;
 use crate::sensor::{NOTHING, Reading, WALL};
 use crate::world::{MountedSensor, RobotBody};
 use sidestep_error_models::ray::{crossings, turn_crossing};
-use sidestep_map::planning::{FreeSpace, FreeWindow};
+use sidestep_map::planning::{FREE_WINDOW_COLUMNS, FreeSpace};
+use std::ops::Range;
 use std::sync::Arc;
 
-/// Distance in boxes up to which a robot plans. The square around it then has 81 places, which one word of
-/// 128 bits holds as a set.
-pub(super) const PLAN_RADIUS_BOXES: i32 = 4;
-pub(super) const PLAN_SIDE_BOXES: i32 = 2 * PLAN_RADIUS_BOXES + 1;
 /// Columns and rows, from `-PLAN_RADIUS_BOXES` on, of boxes in which something is looked for. The body
 /// covers boxes east and north of the one from which all are counted, so there must be more on that side.
-const SEARCH_SIDE_BOXES: i32 = FreeWindow::SIDE as i32;
+const SEARCH_SIDE_BOXES: i32 = FREE_WINDOW_COLUMNS as i32;
+
+/// The walls among the boxes in which something is looked for.
+type FreeWindow = sidestep_map::planning::FreeWindow<FREE_WINDOW_COLUMNS>;
+
 /// Most boxes that one report of a class other than the nearest may block. A class of many boxes with one
 /// thing somewhere in them would wall a corridor off; its boxes are vague instead.
 const MAX_EXACT_BOXES: usize = 2;
 /// Votes of one beam for a box that it has passed, where beams are reliable: it outweighs 63 reports, each
 /// of which says only that something is in one of several boxes.
 const RELIABLE_VOTES: i8 = 64;
-
-const LOCAL_BOXES: u32 = (PLAN_SIDE_BOXES * PLAN_SIDE_BOXES) as u32;
-/// All places of the square.
-const ALL_BOXES: u128 = (1 << LOCAL_BOXES) - 1;
-/// The places of the column farthest east.
-const EASTERNMOST: u128 = {
-    let mut column = 0;
-    let mut n = PLAN_SIDE_BOXES as u32 - 1;
-    while n < LOCAL_BOXES {
-        column |= 1 << n;
-        n += PLAN_SIDE_BOXES as u32;
-    }
-    column
-};
-
-/// A set of places around a robot, by the columns and rows from its own place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct LocalBoxSet(u128);
-
-impl LocalBoxSet {
-    /// Returns the number of a place, row by row from the southwest; none outside the square.
-    pub(super) fn index(col: i32, row: i32) -> Option<usize> {
-        let inside = col.abs() <= PLAN_RADIUS_BOXES && row.abs() <= PLAN_RADIUS_BOXES;
-        inside.then_some(
-            ((row + PLAN_RADIUS_BOXES) * PLAN_SIDE_BOXES + col + PLAN_RADIUS_BOXES) as usize,
-        )
-    }
-
-    /// Returns whether a place is in the set; none outside the square is.
-    pub(super) fn contains(self, col: i32, row: i32) -> bool {
-        Self::index(col, row).is_some_and(|n| self.0 >> n & 1 == 1)
-    }
-
-    /// Returns the places beside those of the set, to the east, north, west and south.
-    pub(super) fn neighbors(self) -> Self {
-        let east = (self.0 & !EASTERNMOST) << 1;
-        let west = (self.0 & !(EASTERNMOST >> (PLAN_SIDE_BOXES - 1))) >> 1;
-        // What is moved beyond the last row is cut off by the mask, beyond the first one by the word.
-        let north = self.0 << PLAN_SIDE_BOXES & ALL_BOXES;
-        let south = self.0 >> PLAN_SIDE_BOXES;
-        Self(east | north | west | south)
-    }
-
-    pub(super) fn insert(&mut self, col: i32, row: i32) {
-        if let Some(n) = Self::index(col, row) {
-            self.0 |= 1 << n;
-        }
-    }
-}
 
 /// Places around a robot where something is that the static map does not show.
 #[derive(Debug, Clone, Copy, Default)]
@@ -88,6 +42,19 @@ pub(super) struct BeamModel {
     pub(super) are_reliable: bool,
     /// All beams in the order of the readings, at each heading.
     beams: [Box<[BeamPath]>; 4],
+    /// By heading and by direction of the next step: the beams that cross the boxes that matter to it.
+    step_beams: [[Box<[StepBeam]>; 4]; 4],
+}
+
+/// A beam that crosses some of the boxes that matter to a step.
+#[derive(Debug)]
+struct StepBeam {
+    /// Number of the beam.
+    beam: usize,
+    /// The first and the last of these boxes, and those between, by their numbers along the beam.
+    boxes: Range<usize>,
+    /// Distance classes of these boxes, a bit each.
+    classes: u32,
 }
 
 /// One beam, as far as a robot plans.
@@ -108,7 +75,7 @@ struct BeamBox {
 
 impl BeamPath {
     /// Returns the stretch of the beam in which there is something that is not the wall behind it.
-    fn occupied_segment(&self, reading: Reading, free: &FreeWindow) -> Option<OccupiedSegment<'_>> {
+    fn occupied_range(&self, reading: Reading, free: &FreeWindow) -> Option<Range<usize>> {
         if reading.observation == NOTHING {
             return None;
         }
@@ -128,8 +95,13 @@ impl BeamPath {
             }
             end += usize::from(crossed.class == reading.class);
         }
-        let boxes = &self.crossed[first..end];
-        (!boxes.is_empty()).then_some(OccupiedSegment { boxes, is_near: reading.class == 0 })
+        (first < end).then_some(first..end)
+    }
+
+    /// Returns the boxes of [`Self::occupied_range`].
+    fn occupied_segment(&self, reading: Reading, free: &FreeWindow) -> Option<OccupiedSegment<'_>> {
+        let boxes = &self.crossed[self.occupied_range(reading, free)?];
+        Some(OccupiedSegment { boxes, is_near: reading.class == 0 })
     }
 }
 
@@ -179,12 +151,45 @@ struct OccupiedSegment<'a> {
 
 impl BeamModel {
     pub(super) fn new(walls: Arc<FreeSpace>, size: u32, body: &RobotBody, box_size_m: f64) -> Self {
-        let beams = [0, 1, 2, 3].map(|heading| {
+        let beams: [Box<[BeamPath]>; 4] = [0, 1, 2, 3].map(|heading| {
             let sensors = body.sensors.iter();
             sensors.flat_map(|sensor| beam_paths(sensor, size, heading, box_size_m)).collect()
         });
         let are_reliable = body.sensors.iter().all(MountedSensor::is_error_free);
-        Self { walls, size: size as i32, are_reliable, beams }
+        let step_beams = beams
+            .each_ref()
+            .map(|beams| [0, 1, 2, 3].map(|direction| step_beams(beams, size as i32, direction)));
+        Self { walls, size: size as i32, are_reliable, beams, step_beams }
+    }
+
+    /// Returns whether no reading speaks of something unknown in the boxes of the next step, beyond them, or to the
+    /// right of them, from where another robot may come into them.
+    pub(super) fn is_clear(&self, percept: &Percept<'_>, direction: u8) -> bool {
+        let heading = usize::from(percept.heading);
+        let beams = &self.beams[heading];
+        let mut free = None;
+        for step_beam in &self.step_beams[heading][usize::from(direction)] {
+            let reading = percept.readings[step_beam.beam];
+            let is_relevant =
+                reading.observation != NOTHING && step_beam.classes >> reading.class & 1 == 1;
+            if !is_relevant {
+                continue;
+            }
+            // Only now, because most readings speak of nothing near.
+            let free = free.get_or_insert_with(|| self.free_window(percept.at));
+            let occupied = beams[step_beam.beam].occupied_range(reading, free);
+            let meets = |range: Range<usize>| {
+                range.start < step_beam.boxes.end && step_beam.boxes.start < range.end
+            };
+            if occupied.is_some_and(meets) {
+                return false;
+            }
+        }
+        true
+    }
+
+    fn free_window(&self, (col, row): (u32, u32)) -> FreeWindow {
+        self.walls.window(col as i32 - PLAN_RADIUS_BOXES, row as i32 - PLAN_RADIUS_BOXES)
     }
 
     /// Returns the things that the robot's readings report and the static map does not explain; none
@@ -194,9 +199,7 @@ impl BeamModel {
         if percept.readings.iter().all(|reading| reading.observation == NOTHING) {
             return None;
         }
-        let (col, row) = percept.at;
-        let free =
-            &self.walls.window(col as i32 - PLAN_RADIUS_BOXES, row as i32 - PLAN_RADIUS_BOXES);
+        let free = &self.free_window(percept.at);
         // Mostly nothing unknown is there, and then the free boxes need not be found.
         self.occupied_segments(percept, free).next()?;
         let mut votes = OccupancyVotes::default();
@@ -285,6 +288,31 @@ fn beam_paths(sensor: &MountedSensor, size: u32, heading: u8, box_size_m: f64) -
         paths.push(BeamPath { wall, crossed: crossed.collect() });
     }
     paths
+}
+
+/// Returns the beams that cross boxes that matter to a step: those that the body comes into, and those from which
+/// another one may come into them, from ahead or from the right.
+fn step_beams(beams: &[BeamPath], size: i32, direction: u8) -> Box<[StepBeam]> {
+    let (east, north) = HEADINGS[usize::from(direction)];
+    let (right_east, right_north) = HEADINGS[usize::from((direction + 3) % 4)];
+    let covers = |anchor: (i32, i32), one: &BeamBox| {
+        (anchor.0..anchor.0 + size).contains(&one.col)
+            && (anchor.1..anchor.1 + size).contains(&one.row)
+    };
+    let matters = |one: &BeamBox| {
+        let anchors =
+            [(east, north), (2 * east, 2 * north), (east + right_east, north + right_north)];
+        !covers((0, 0), one) && anchors.into_iter().any(|anchor| covers(anchor, one))
+    };
+    let of_beam = |(beam, path): (usize, &BeamPath)| {
+        let mut numbers = (0..path.crossed.len()).filter(|&n| matters(&path.crossed[n]));
+        let first = numbers.next()?;
+        let end = numbers.next_back().unwrap_or(first) + 1;
+        let boxes = first..end;
+        let classes = path.crossed[boxes.clone()].iter().fold(0, |bits, one| bits | 1 << one.class);
+        Some(StepBeam { beam, boxes, classes })
+    };
+    beams.iter().enumerate().filter_map(of_beam).collect()
 }
 
 /// Returns whether something is looked for in boxes of this column or row.

@@ -7,6 +7,9 @@ use super::super::pass_request::{self, OWN_REQUEST_WORD, PassRequest};
 /// Index of the first word; the second is shared with the robot's request.
 const PLANNER_MEMORY_WORD: usize = 1;
 
+/// Most decisions to stand still before something that a robot can count.
+pub(super) const MAX_WAITED: u8 = 7;
+
 /// Everything that a planning robot remembers between its actions, beside its progress on its list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct PlannerMemory {
@@ -34,7 +37,7 @@ pub(super) struct PlannerMemory {
     pub(super) yield_rank: u8,
     /// Decisions to stand still before something since the last move; up to 7.
     pub(super) waited: u8,
-    /// Actions left of a walk at random out of a deadlock; up to 15.
+    /// Actions left of a walk at random out of a deadlock, or of a detour; up to 15.
     pub(super) stray_left: u8,
 }
 
@@ -78,6 +81,17 @@ impl PlannerMemory {
         two.write_u8(self.waited, 3);
         two.write_u8(self.stray_left, 4);
         memory.words[OWN_REQUEST_WORD] = two.word;
+    }
+
+    /// Returns whether it goes around something that it has waited for as long as it can. A walk at random begins without
+    /// having waited.
+    pub(super) fn is_on_detour(&self) -> bool {
+        self.stray_left > 0 && self.waited == MAX_WAITED
+    }
+
+    /// Returns whether it does something else than to go to its goal, or believes that something is in its way.
+    pub(super) fn is_occupied(&self) -> bool {
+        self.yield_left > 0 || self.stray_left > 0 || self.bump_left > 0
     }
 
     /// Asks the body that stands in a direction to make room.

@@ -15,8 +15,10 @@
 //!    actions. Without this, two robots in a dead end could wait for each other forever.
 
 mod detour;
+mod local_box_set;
 mod local_costmap;
 mod local_grid;
+mod local_view;
 mod memory;
 mod step_costs;
 #[cfg(test)]
@@ -27,8 +29,9 @@ use super::{Memory, Percept};
 use crate::effector::{ActionId, FORWARD, HEADINGS, LEFT, RIGHT, STAY};
 use crate::sensor::WALL;
 use crate::world::RobotBody;
-use local_costmap::{BeamModel, LocalBoxSet, LocalCostmap};
-use memory::PlannerMemory;
+use local_costmap::{BeamModel, LocalCostmap};
+use local_view::{LocalView, goal_direction, next_direction};
+use memory::{MAX_WAITED, PlannerMemory};
 use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::{FlowField, FreeSpace};
 use std::sync::Arc;
@@ -49,6 +52,14 @@ const WAIT_TIMEOUT_DECISIONS: u8 = 5;
 /// Decisions since the last move after which a robot no longer yields to others that might step into
 /// the same place, because in a crowd there is always one.
 const MAX_YIELD_DECISIONS: u8 = 4;
+/// Decisions for which a robot waits before something in the hope that it goes on; then it goes around.
+const PATIENT_DECISIONS: u8 = 4;
+/// Price of a blocked place for a robot that has no patience left: above that of a long detour.
+const IMPATIENT_BLOCKED_COST: u16 = 31;
+/// Extra price of a place that is off lane, because who overtakes a queue meets those that come.
+const OFF_LANE_COST: u16 = 6;
+/// Decisions for which a robot that has waited long enough goes around what it has waited for, at most.
+const DETOUR_DECISIONS: u8 = 15;
 /// Highest rank of a robot that has been at its last goal and was asked to leave it. Its rank grows
 /// with the time that it is away, but stays below the ranks of robots that still have a goal.
 const MAX_DONE_RANK: u8 = 63;
@@ -79,62 +90,6 @@ impl CurrentGoal<'_> {
     }
 }
 
-/// Everything that a robot knows of the places around it.
-struct LocalView<'a> {
-    field: &'a FlowField,
-    at: (u32, u32),
-    heading: u8,
-    blocked: LocalBoxSet,
-    vague: LocalBoxSet,
-    /// See [`Planner::is_careful`].
-    is_careful: bool,
-    /// Whether no other body is noticed.
-    is_alone: bool,
-}
-
-impl LocalView<'_> {
-    fn offset(&self, col: i32, row: i32) -> (u32, u32) {
-        (self.at.0.wrapping_add_signed(col), self.at.1.wrapping_add_signed(row))
-    }
-
-    fn rise(&self, direction: u8) -> Option<i8> {
-        self.field.rise(self.at.0, self.at.1, direction)
-    }
-
-    fn is_blocked(&self, direction: u8) -> bool {
-        let (east, north) = HEADINGS[usize::from(direction)];
-        self.blocked.contains(east, north)
-    }
-
-    /// Returns whether a step in a direction meets neither a wall nor a known obstacle.
-    fn is_open(&self, direction: u8) -> bool {
-        self.rise(direction).is_some() && !self.is_blocked(direction)
-    }
-
-    /// Returns whether an obstacle stands next to the place ahead, on that side of it.
-    fn is_blocked_beyond(&self, ahead: u8, side: u8) -> bool {
-        let (east, north) = HEADINGS[usize::from(ahead)];
-        let (side_east, side_north) = HEADINGS[usize::from(side % 4)];
-        self.blocked.contains(east + side_east, north + side_north)
-    }
-
-    /// Returns the direction of a shortest path on the static map; ahead where there is one, because
-    /// every turn costs an action.
-    fn goal_direction(&self) -> Option<u8> {
-        if self.rise(self.heading) == Some(-1) {
-            return Some(self.heading);
-        }
-        self.field.direction(self.at.0, self.at.1)
-    }
-
-    /// Returns the direction in which the path goes on behind the next place.
-    fn next_direction(&self, direction: u8) -> Option<u8> {
-        let (east, north) = HEADINGS[usize::from(direction)];
-        let (col, row) = self.offset(east, north);
-        self.field.direction(col, row)
-    }
-}
-
 impl Planner {
     /// Returns a planner for robots with this body; `walls` are the free boxes of the static map.
     pub(crate) fn new(
@@ -159,6 +114,13 @@ impl Planner {
         let heard = PassRequest::take_heard(words);
         let mut memory = PlannerMemory::from_memory(words);
         update_memory(&mut memory, goal, percept, draws);
+        let is_free = heard.is_none() && !memory.is_occupied() && !goal.is_final_place(percept.at);
+        if let Some(direction) = self.clear_direction(goal, percept).filter(|_| is_free) {
+            let then = next_direction(goal.field, percept.at, direction);
+            memory.set_request(memory.rank, direction, then);
+            memory.store(words);
+            return turn_to(percept.heading, direction).unwrap_or(FORWARD);
+        }
         let view = self.view(goal, percept, &memory, heard.is_some());
         // An obstacle ahead is believed to be there once more, because a sensor may miss it.
         let may_miss = !self.beam_model.are_reliable;
@@ -166,21 +128,34 @@ impl Planner {
             memory.bump = view.heading;
             memory.bump_left = BUMP_DECISIONS;
         }
+        let mut rank = memory.rank;
         if let Some(request) = heard {
-            obey_request(&mut memory, request, &view, draws);
+            if view.goes_that_way(request) {
+                // It is in the way as little as it can: what stands before it hears of the higher rank.
+                rank = rank.max(request.rank);
+            } else {
+                obey_request(&mut memory, request, &view, draws);
+            }
         }
         // Making room comes first, because a robot of a higher rank waits for it.
         let action = if memory.yield_left > 0 {
             make_room(&mut memory, &view)
-        } else if memory.stray_left > 0 {
+        } else if memory.stray_left > 0 && !memory.is_on_detour() {
             stray(&mut memory, &view, draws)
         } else if goal.is_final_place(percept.at) {
             STAY
         } else {
-            travel(&mut memory, &view, draws)
+            travel(&mut memory, &view, rank, draws)
         };
         memory.store(words);
         action
+    }
+
+    /// Returns the direction of a shortest path on the static map, if nothing is noticed in its next step; none there, and
+    /// at a goal.
+    fn clear_direction(&self, goal: CurrentGoal<'_>, percept: &Percept<'_>) -> Option<u8> {
+        let direction = goal_direction(goal.field, percept.at, percept.heading)?;
+        self.beam_model.is_clear(percept, direction).then_some(direction)
     }
 
     /// Returns the places around a robot as it knows them: by the static map, its readings, and its
@@ -206,6 +181,7 @@ impl Planner {
             blocked,
             vague,
             is_careful: self.is_careful,
+            is_done: goal.is_done,
             is_alone,
         }
     }
@@ -236,9 +212,16 @@ fn update_memory(
     memory.place = place;
     if let Some(direction) = moved {
         memory.moved = direction + 1;
-        memory.waited = 0;
+        if memory.is_on_detour() {
+            end_detour(memory, goal, percept.at, direction);
+        } else {
+            memory.waited = 0;
+        }
         memory.bump_left = 0;
         memory.yield_pending = false;
+    }
+    if memory.is_on_detour() {
+        count_detour_decision(memory, goal, percept.at, moved);
     }
     memory.stuck = stuck_count(memory.stuck, goal, percept.at, moved);
     if memory.stuck >= MIN_STRAY_ACTIONS + memory.rank / 8 {
@@ -251,9 +234,39 @@ fn update_memory(
     }
 }
 
+/// Ends a detour after a move along the path of the static map that is on lane: the robot is past what it has waited for.
+fn end_detour(memory: &mut PlannerMemory, goal: CurrentGoal<'_>, at: (u32, u32), moved: u8) {
+    let goes_along = goal.field.direction(at.0, at.1).is_none_or(|direction| direction == moved);
+    let lanes = goal.field.lanes();
+    let is_off_lane = lanes.is_some_and(|lanes| lanes.is_off_lane(at.0, at.1, moved));
+    if goes_along && !is_off_lane {
+        memory.waited = 0;
+        memory.stray_left = 0;
+    }
+}
+
+/// Counts a decision on a detour. Steps aside do not count, because the obstacle may be wide.
+fn count_detour_decision(
+    memory: &mut PlannerMemory,
+    goal: CurrentGoal<'_>,
+    at: (u32, u32),
+    moved: Option<u8>,
+) {
+    let rise_back = moved.and_then(|moved| goal.field.rise(at.0, at.1, (moved + 2) % 4));
+    let is_aside = rise_back.is_some_and(|rise| rise < 0);
+    if is_aside {
+        return;
+    }
+    memory.stray_left -= 1;
+    if memory.stray_left == 0 {
+        memory.waited = 0;
+    }
+}
+
 /// Lets a robot leave a deadlock: with a new rank, because the old ones have led into it.
 fn start_straying(memory: &mut PlannerMemory, goal: CurrentGoal<'_>, draws: &mut Draws) {
     memory.stuck = 0;
+    memory.waited = 0;
     if !goal.is_done {
         memory.rank = draw_rank(draws);
     }
@@ -269,9 +282,9 @@ fn stuck_count(stuck: u8, goal: CurrentGoal<'_>, at: (u32, u32), moved: Option<u
     }
     let rise_back = moved.and_then(|direction| goal.field.rise(at.0, at.1, (direction + 2) % 4));
     match rise_back {
-        Some(1) => stuck.saturating_sub(2),
+        Some(rise) if rise > 0 => stuck.saturating_sub(2),
         // More than a step forward takes off, so that going to and fro counts as being stuck.
-        Some(-1) => stuck.saturating_add(3),
+        Some(rise) if rise < 0 => stuck.saturating_add(3),
         _ => stuck.saturating_add(1),
     }
 }
@@ -336,7 +349,7 @@ fn cheapest_exit(request: PassRequest, view: &LocalView<'_>, draws: &mut Draws) 
         // equal places, so that two robots that make room do not go on choosing alike.
         let price = 32 * u32::from(view.is_blocked(direction))
             + 12 * u32::from(request.then == Some(direction))
-            + 4 * (rise + 1) as u32
+            + 4 * (rise.signum() + 1) as u32
             + 2 * u32::from(turn.min(4 - turn))
             + draws.uniform_below(2);
         if best.is_none_or(|(least, _)| price < least) {
@@ -379,15 +392,28 @@ fn stray(memory: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) ->
     if draws.uniform_below(2) == 0 { LEFT } else { RIGHT }
 }
 
-/// Takes the next step toward the goal, or waits before an obstacle.
-fn travel(memory: &mut PlannerMemory, view: &LocalView<'_>, draws: &mut Draws) -> ActionId {
+/// Takes the next step toward the goal, or waits before an obstacle, and asks for room with a rank.
+fn travel(
+    memory: &mut PlannerMemory,
+    view: &LocalView<'_>,
+    rank: u8,
+    draws: &mut Draws,
+) -> ActionId {
     let direction = if view.is_alone {
         view.goal_direction()
     } else {
         detour::first_step(view, step_costs(memory, view))
     };
     let Some(direction) = direction else { return STAY };
-    memory.set_request(memory.rank, direction, view.next_direction(direction));
+    if !memory.is_on_detour()
+        && view.field.lanes().is_some()
+        && memory.waited >= PATIENT_DECISIONS
+        && !view.descends(direction)
+    {
+        memory.waited = MAX_WAITED;
+        memory.stray_left = DETOUR_DECISIONS;
+    }
+    memory.set_request(rank, direction, view.next_direction(direction));
     if let Some(turn) = turn_to(view.heading, direction) {
         return turn;
     }
@@ -413,12 +439,30 @@ fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
     // Where sensors or wheels err, a slip or a thing at the far end of its class soon ends in a contact.
     let beside = if view.is_careful { 6 } else { 1 };
     let vague = if view.is_careful { 5 } else { 1 };
-    let has_gained = moved.is_some_and(|moved| view.rise((moved + 2) % 4) == Some(1));
+    let has_gained =
+        moved.is_some_and(|moved| view.rise((moved + 2) % 4).is_some_and(|rise| rise > 0));
     // Where nothing errs robots see enough to keep to every change of course.
     let is_sidestep = !view.is_careful || moved.is_some() && !has_gained;
-    // At first cheaper than most detours, because the obstacle may go away; each decision in vain
-    // makes a longer detour worth it.
-    StepCosts { blocked: 3 + 4 * u16::from(memory.waited), beside, vague, moved, is_sidestep }
+    let is_patient = memory.waited < PATIENT_DECISIONS;
+    let off_lane = if is_patient { OFF_LANE_COST } else { 1 };
+    let blocked = if view.field.lanes().is_none() {
+        // At first cheaper than most detours, because the obstacle may go away; each decision in vain
+        // makes a longer detour worth it.
+        3 + 4 * u16::from(memory.waited)
+    } else if is_patient {
+        3 + u16::from(memory.waited)
+    } else {
+        IMPATIENT_BLOCKED_COST
+    };
+    StepCosts {
+        blocked,
+        off_lane,
+        is_on_detour: memory.is_on_detour(),
+        beside,
+        vague,
+        moved,
+        is_sidestep,
+    }
 }
 
 /// Returns whether to let another robot pass that may step into the same place: one from the

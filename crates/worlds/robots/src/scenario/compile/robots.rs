@@ -6,6 +6,7 @@ use super::random::UnlocatedError;
 use super::unused_keys::BEHAVIOURS;
 use super::*;
 use sidestep_import::movingai::{ScenRow, load_scen};
+use sidestep_map::planning::Lanes;
 use std::path::PathBuf;
 
 impl Compiler<'_> {
@@ -54,12 +55,12 @@ impl Compiler<'_> {
         }
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let free = Arc::new(FreeSpace::from_map(&self.map));
-        let avoidance = self.avoidance(None, &free, size, &body);
+        let routes = RoutePlanner::new(&self.map, size, None, &body);
+        let avoidance = self.avoidance(None, &routes, &body);
         let mut places = Vec::new();
         let mut types = Vec::new();
         for row in &rows[..count] {
-            let goals = vec![self.scen_goal(scen, row, &free, size)?];
+            let goals = vec![self.scen_goal(scen, row, &routes)?];
             let avoidance = avoidance.clone();
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
             let model = RobotModel::new(Arc::clone(&body), behaviour);
@@ -100,14 +101,14 @@ impl Compiler<'_> {
         &self,
         scen: &Spanned<PathBuf>,
         row: &ScenRow,
-        free: &FreeSpace,
-        size: u32,
+        routes: &RoutePlanner,
     ) -> Result<Arc<FlowField>, InputError> {
         let place = self.source.path(scen.get_ref()).display().to_string();
         let checked = row.check_against(&place, &self.map);
         checked.map_err(|error| self.source.with_key_at(scen.span(), error))?;
-        let field = FlowField::to_nearest(free, size, &[row.goal]);
+        let field = routes.to_nearest(&[row.goal]);
         if !field.is_goal(row.goal.0, row.goal.1) {
+            let size = routes.size;
             let cause = format!("a robot of {size} x {size} boxes does not fit at {:?}", row.goal);
             let remedy = "give smaller robots, or another list";
             return Err(InputError::new(&place, cause, remedy).with_position(row.line, 1));
@@ -213,13 +214,13 @@ impl Compiler<'_> {
     fn avoidance(
         &self,
         section: Option<AvoidanceSection>,
-        free: &Arc<FreeSpace>,
-        size: u32,
+        routes: &RoutePlanner,
         body: &RobotBody,
     ) -> Avoidance {
         match section.unwrap_or_default() {
             AvoidanceSection::Plan => {
-                let walls = Arc::clone(free);
+                let walls = Arc::clone(&routes.free);
+                let size = routes.size;
                 let box_size_m = self.map.box_size_m;
                 let wheels_err =
                     !self.file.regime.has_reliable_effectors() && body.effector.has_errors();
@@ -235,6 +236,36 @@ impl Compiler<'_> {
         let own = self.own.keys().map(String::as_str);
         let known: Vec<&str> = BEHAVIOURS.iter().map(|(name, _)| *name).chain(own).collect();
         (format!("unknown behaviour `{name}`"), suggestion(name, &known))
+    }
+}
+
+/// Finds the shortest paths of robots of one size to any goal.
+struct RoutePlanner {
+    free: Arc<FreeSpace>,
+    size: u32,
+    /// Lanes that the paths keep to; none for robots that do not plan, or see nobody who comes.
+    lanes: Option<Arc<Lanes>>,
+}
+
+impl RoutePlanner {
+    fn new(
+        map: &GridMap,
+        size: u32,
+        avoidance: Option<AvoidanceSection>,
+        body: &RobotBody,
+    ) -> Self {
+        let free = Arc::new(FreeSpace::from_map(map));
+        let is_planned = avoidance.unwrap_or_default() == AvoidanceSection::Plan;
+        let has_lanes = is_planned && !body.sensors.is_empty();
+        let lanes = has_lanes.then(|| Arc::new(Lanes::new(&free, size)));
+        Self { free, size, lanes }
+    }
+
+    fn to_nearest(&self, goals: &[(u32, u32)]) -> FlowField {
+        match &self.lanes {
+            Some(lanes) => FlowField::along_lanes(&self.free, self.size, goals, lanes),
+            None => FlowField::to_nearest(&self.free, self.size, goals),
+        }
     }
 }
 
@@ -272,23 +303,23 @@ impl BehaviourBuilder<'_, '_> {
 
     fn shuttle(&self) -> Result<Arc<dyn Behaviour>, InputError> {
         let s = self.section.get_ref();
-        let free = Arc::new(FreeSpace::from_map(&self.compiler.map));
+        let routes = RoutePlanner::new(&self.compiler.map, self.size, s.avoidance, self.body);
         let a = self.required("a", s.a, "[col, row, width, height]")?;
-        let start = self.flow_field(&free, a)?;
+        let start = self.flow_field(&routes, a)?;
         let b = self.required("b", s.b, "[col, row, width, height]")?;
-        let end = self.flow_field(&free, b)?;
-        let avoidance = self.compiler.avoidance(s.avoidance, &free, self.size, self.body);
+        let end = self.flow_field(&routes, b)?;
+        let avoidance = self.compiler.avoidance(s.avoidance, &routes, self.body);
         Ok(Arc::new(Shuttle { ends: [start, end], avoidance }))
     }
 
     fn goto(&self) -> Result<Arc<dyn Behaviour>, InputError> {
         let s = self.section.get_ref();
-        let free = Arc::new(FreeSpace::from_map(&self.compiler.map));
+        let routes = RoutePlanner::new(&self.compiler.map, self.size, s.avoidance, self.body);
         let mut goals = Vec::new();
         for &(col, row) in self.required("goals", s.goals.as_ref(), "[[col, row], ...]")? {
-            goals.push(self.flow_field(&free, [col, row, 1, 1])?);
+            goals.push(self.flow_field(&routes, [col, row, 1, 1])?);
         }
-        let avoidance = self.compiler.avoidance(s.avoidance, &free, self.size, self.body);
+        let avoidance = self.compiler.avoidance(s.avoidance, &routes, self.body);
         Ok(Arc::new(Goto { goals, repeat: s.repeat.unwrap_or(false), avoidance }))
     }
 
@@ -298,13 +329,17 @@ impl BehaviourBuilder<'_, '_> {
     }
 
     /// Returns the shortest paths to a region in which there is room for a robot.
-    fn flow_field(&self, free: &FreeSpace, rect: [u32; 4]) -> Result<Arc<FlowField>, InputError> {
+    fn flow_field(
+        &self,
+        routes: &RoutePlanner,
+        rect: [u32; 4],
+    ) -> Result<Arc<FlowField>, InputError> {
         let size = self.size;
         self.compiler.check_rect(rect, self.section.span())?;
         let [col, row, width, height] = rect;
         let goals: Vec<_> =
             (row..row + height).flat_map(|r| (col..col + width).map(move |c| (c, r))).collect();
-        let field = FlowField::to_nearest(free, size, &goals);
+        let field = routes.to_nearest(&goals);
         // A box of the region in which a robot does not fit is no goal.
         if goals.iter().any(|&(c, r)| field.is_goal(c, r)) {
             return Ok(Arc::new(field));
