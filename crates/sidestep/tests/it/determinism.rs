@@ -10,12 +10,13 @@ use sidestep_kernel::ports::{MemoryRecorder, Recorder};
 
 const CYCLES: u64 = 300;
 
-const POLICIES: [&str; 5] = [
+const POLICIES: [&str; 6] = [
     "conflict_policy='random'",
     "conflict_policy='fixed'",
     "conflict_policy='right_of_way'",
     "conflict_policy='rounds'",
     "conflict_policy='by_kind'",
+    "conflict_policy='simultaneous'",
 ];
 const ORDER: &str = "kind_order=['door', 'person', 'robot']";
 

@@ -123,7 +123,7 @@ proptest! {
         robots in 1u32..12,
         people in 0u32..8,
         size in 1u32..3,
-        policy in prop::sample::select(vec!["random", "fixed", "right_of_way", "rounds"]),
+        policy in prop::sample::select(vec!["random", "fixed", "right_of_way", "rounds", "simultaneous"]),
     ) {
         let rows: Vec<String> = walls
             .chunks(12)

@@ -52,13 +52,34 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         };
         let walk = &action.walks[self.draw_transition(action, slot, word)];
         if are_free(self.floor, self.base(body), &walk.whole.enter) {
-            self.execute_whole(walk, slot);
-            if scratch.keep_motions {
-                let result = WalkResult { steps: walk.steps.len(), contact: None };
-                self.record_motion(walk, result, body, scratch);
-            }
+            self.execute_free(walk, slot, scratch);
         } else {
-            self.execute_blocked(walk, slot, scratch);
+            self.execute_blocked(walk, self.walk_result(walk, slot), slot, scratch);
+        }
+    }
+
+    /// Makes a walk with a known result, and returns the number of steps made.
+    pub(super) fn execute_result(
+        &self,
+        walk: &StepPath,
+        result: WalkResult,
+        slot: EntitySlot,
+        scratch: &mut Scratch,
+    ) -> usize {
+        if result.contact.is_some() {
+            return self.execute_blocked(walk, result, slot, scratch);
+        }
+        self.execute_free(walk, slot, scratch);
+        walk.steps.len()
+    }
+
+    /// Makes a whole walk that meets no obstacle.
+    #[inline]
+    fn execute_free(&self, walk: &StepPath, slot: EntitySlot, scratch: &mut Scratch) {
+        self.execute_whole(walk, slot);
+        if scratch.keep_motions {
+            let result = WalkResult { steps: walk.steps.len(), contact: None };
+            self.record_motion(walk, result, self.body(slot), scratch);
         }
     }
 
@@ -68,14 +89,17 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         match self.world.obstacle_rule {
             // Here obstacles change the effect of a transition, not its probability.
             ObstacleRule::Cut | ObstacleRule::Stay => action.distribution.sample(word),
-            ObstacleRule::Renormalise => match self.unblocked_distribution(action, slot) {
-                Ok(distribution) => distribution.sample(word),
-                Err(blocked) => blocked,
-            },
+            ObstacleRule::Renormalise => {
+                let is_free = |walk: &StepPath| self.walk_result(walk, slot).contact.is_none();
+                match self.unblocked_distribution(action, is_free) {
+                    Ok(distribution) => distribution.sample(word),
+                    Err(blocked) => blocked,
+                }
+            }
         }
     }
 
-    /// Makes a whole walk that meets no obstacle. It writes only the boxes that differ at its end, and not
+    /// Moves a body to the end of a whole walk. It writes only the boxes that differ at its end, and not
     /// those that steps enter and leave again, because nearly all walks are made whole.
     #[inline]
     fn execute_whole(&self, walk: &StepPath, slot: EntitySlot) {
@@ -106,18 +130,28 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         }
     }
 
-    /// Makes a walk that an obstacle may cut short.
-    fn execute_blocked(&self, walk: &StepPath, slot: EntitySlot, scratch: &mut Scratch) {
+    /// Returns whether a body keeps the steps of a walk before an obstacle. People try single boxes, which cannot be
+    /// cut short.
+    pub(super) fn keeps_steps(&self, slot: EntitySlot) -> bool {
+        let is_mover = matches!(self.type_of(self.body(slot)).role, Role::Mover(_));
+        self.world.obstacle_rule == ObstacleRule::Cut && !is_mover
+    }
+
+    /// Makes a walk that an obstacle may cut short, and returns the number of steps made.
+    fn execute_blocked(
+        &self,
+        walk: &StepPath,
+        result: WalkResult,
+        slot: EntitySlot,
+        scratch: &mut Scratch,
+    ) -> usize {
         let body = self.body(slot);
-        let result = self.walk_result(walk, slot);
-        let is_mover = matches!(self.type_of(body).role, Role::Mover(_));
-        // People try single boxes, which cannot be cut short.
-        let keeps_steps = self.world.obstacle_rule == ObstacleRule::Cut && !is_mover;
-        let steps = if result.contact.is_none() || keeps_steps { result.steps } else { 0 };
+        let is_whole = result.contact.is_none();
+        let steps = if is_whole || self.keeps_steps(slot) { result.steps } else { 0 };
         self.execute_steps(walk, steps, slot);
         // Only robots keep contacts; people just try another time.
-        if is_mover {
-            return;
+        if matches!(self.type_of(body).role, Role::Mover(_)) {
+            return steps;
         }
         if scratch.keep_motions {
             let result = WalkResult { steps, ..result };
@@ -132,6 +166,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             }
             Some(blocker) => self.record_contact(body, blocker, scratch),
         }
+        steps
     }
 
     /// Records a contact in the body's state, in its counters and, where events are kept, as an event.
@@ -203,15 +238,15 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     /// Returns the distribution over the walks that are not blocked here (the paper's update of the
     /// distribution in the presence of a conflict: an occurrence is allowed or denied), or, when none is
     /// left, the first blocked one as an error: the action then ends in its contact.
-    fn unblocked_distribution(
+    pub(super) fn unblocked_distribution(
         &self,
         action: &Action,
-        slot: EntitySlot,
+        is_free: impl Fn(&StepPath) -> bool,
     ) -> Result<Categorical, usize> {
         let walks = action.probabilities.iter().zip(&action.walks);
         let mut row: Vec<f64> = walks
             .map(|(&p, walk)| {
-                let is_allowed = p > 0.0 && self.walk_result(walk, slot).contact.is_none();
+                let is_allowed = p > 0.0 && is_free(walk);
                 if is_allowed { p } else { 0.0 }
             })
             .collect();
@@ -224,7 +259,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     }
 
     /// Opens a door, or closes it when no body stands in it; otherwise closing waits.
-    fn toggle(&self, slot: EntitySlot, scratch: &mut Scratch) {
+    pub(super) fn toggle(&self, slot: EntitySlot, scratch: &mut Scratch) {
         let floor = self.floor;
         let body = self.body(slot);
         let base = self.base(body);

@@ -77,6 +77,11 @@ impl<'a, T: OccupantWord> Inspector<'a, T> {
         self.cycle.order(&members, scratch);
         let order = std::mem::take(&mut scratch.order);
         self.add_conflict_group(&order);
+        if self.cycle.world.policy == ConflictPolicy::Simultaneous {
+            scratch.order = order;
+            self.add_outcome_at_once(scratch);
+            return self.inspection;
+        }
         for place in order.iter().take_while(|place| place.slot != self.slot) {
             self.cycle.act(place.slot, place.word, scratch);
         }

@@ -134,7 +134,9 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         let id = body.id;
         match self.world.policy {
             ConflictPolicy::Fixed => (0, 0, id),
-            ConflictPolicy::Random | ConflictPolicy::Rounds => (0, draw, id),
+            ConflictPolicy::Random | ConflictPolicy::Rounds | ConflictPolicy::Simultaneous => {
+                (0, draw, id)
+            }
             ConflictPolicy::ByKind => {
                 (self.world.kind_rank[usize::from(self.type_of(body).kind)], draw, id)
             }

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
-//! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs   one cycle
+//! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio
 //! ```
@@ -39,6 +39,7 @@ mod ranges;
 mod remarks;
 pub mod rows;
 pub mod scenario;
+mod simultaneous;
 pub mod state;
 mod table_notes;
 mod text;
@@ -154,6 +155,8 @@ pub struct Scratch {
     heard: Vec<decide::ReceivedMessage>,
     /// A conflict group in its order of acting.
     order: Vec<join::GroupMember>,
+    /// What the bodies of a group do, where they act at once.
+    group_moves: simultaneous::GroupMoves,
     /// This worker's bids of a round.
     bids: Vec<auction::Bid>,
     /// The kinds of rows that are wanted, see `Collector::prepare`.
@@ -206,6 +209,9 @@ impl Phases for RobotsWorld {
                 return cycle.act_with_draw(alone, phase.scratch);
             }
             cycle.order(group, phase.scratch);
+            if cycle.world.policy == ConflictPolicy::Simultaneous {
+                return cycle.act_at_once(phase.scratch);
+            }
             // Taken out, because acting borrows the whole scratch.
             let order = std::mem::take(&mut phase.scratch.order);
             for member in &order {

@@ -21,12 +21,22 @@ pub enum ConflictPolicy {
     /// neighbors, until all have acted. The outcome is the same, but found in parallel inside large
     /// groups.
     Rounds,
+    /// No order: all transitions are drawn, then made at once. A box that is left can be entered in the same cycle,
+    /// rings rotate, two bodies do not exchange their boxes, and a fair draw decides between those that want the same
+    /// box.
+    Simultaneous,
 }
 
 impl ConflictPolicy {
     /// Every policy, the default one first.
-    pub const ALL: [Self; 5] =
-        [Self::Random, Self::Fixed, Self::ByKind, Self::RightOfWay, Self::Rounds];
+    pub const ALL: [Self; 6] = [
+        Self::Random,
+        Self::Fixed,
+        Self::ByKind,
+        Self::RightOfWay,
+        Self::Rounds,
+        Self::Simultaneous,
+    ];
 
     /// Returns its name in files.
     pub fn name(self) -> &'static str {
@@ -36,6 +46,7 @@ impl ConflictPolicy {
             Self::ByKind => "by_kind",
             Self::RightOfWay => "right_of_way",
             Self::Rounds => "rounds",
+            Self::Simultaneous => "simultaneous",
         }
     }
 }

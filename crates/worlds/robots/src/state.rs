@@ -37,6 +37,11 @@ pub struct RobotsState {
     pub(crate) contacts: AtomicColumn<u32>,
     /// Highest bid per box in the present round; empty unless the policy is `rounds`.
     pub(crate) bids: Box<[AtomicU64]>,
+    /// Place of each body in the order of its group's draws, by slot; empty unless the policy is `simultaneous`, and
+    /// only within a cycle.
+    pub(crate) turns: AtomicColumn<u32>,
+    /// The body that has entered each box in this cycle, as its slot plus 1, or 0; as `turns`.
+    pub(crate) entered_by: AtomicColumn<u32>,
     /// Last broadcast of each robot; empty without radio.
     pub(crate) voices: BroadcastBuffer,
     /// Poses at the start of each cycle, while a run is recorded.
@@ -154,6 +159,8 @@ impl RobotsState {
         (0..).zip(&ids).for_each(|(slot, &id)| slot_of_id[id as usize] = slot);
         let in_rounds = world.policy == ConflictPolicy::Rounds;
         let bids = if in_rounds { world.walls.len() } else { 0 };
+        let is_at_once = world.policy == ConflictPolicy::Simultaneous;
+        let columns = |len| AtomicColumn::filled(if is_at_once { len } else { 0 }, 0);
         Self {
             floor: OccupantGrid::new(world.walls.iter().map(|&kind| kind == WALL), n),
             visited: AtomicBitSet::empty(world.walls.len()),
@@ -165,6 +172,8 @@ impl RobotsState {
             slot_of_id,
             contacts: AtomicColumn::filled(n * world.kinds.len(), 0),
             bids: (0..bids).map(|_| AtomicU64::new(0)).collect(),
+            turns: columns(n),
+            entered_by: columns(world.walls.len()),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
         }
@@ -181,6 +190,8 @@ impl RobotsState {
             slot_of_id: self.slot_of_id.clone(),
             contacts: self.contacts.clone(),
             bids: Box::default(),
+            turns: self.turns.clone(),
+            entered_by: self.entered_by.clone(),
             voices: self.voices.clone(),
             frames: None,
         }
@@ -325,8 +336,12 @@ impl RobotsState {
             + std::mem::size_of_val(&*self.kinds)
             + std::mem::size_of_val(&*self.slot_of_id)
             + self.contacts.heap_bytes()
+            + self.turns.heap_bytes()
             + self.voices.heap_bytes();
-        let boxes = self.floor.heap_bytes() + self.visited.heap_bytes() + size_of_val(&*self.bids);
+        let boxes = self.floor.heap_bytes()
+            + self.visited.heap_bytes()
+            + self.entered_by.heap_bytes()
+            + size_of_val(&*self.bids);
         (boxes, bodies)
     }
 }

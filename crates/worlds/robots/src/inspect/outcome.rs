@@ -31,7 +31,8 @@ impl<T: OccupantWord> Inspector<'_, T> {
         let start_m = self.position_m();
         if let Some(action) = self.action() {
             let drawn = self.cycle.draw_transition(action, self.slot, word);
-            let all = self.transition_results(action);
+            let all =
+                self.transition_results(action, |walk| self.cycle.walk_result(walk, self.slot));
             section = self.with_drawn_transition(section, &action.walks[drawn], &all[drawn]);
             section = section.table(transition_table(action, &all, drawn));
             self.draw_paths(start_m, action, drawn, &all[drawn]);
@@ -42,12 +43,39 @@ impl<T: OccupantWord> Inspector<'_, T> {
         self.inspection.add_section(section);
     }
 
-    /// Tries all transitions of an action where the body is.
-    fn transition_results(&self, action: &Action) -> Vec<TransitionResult> {
+    /// Lets the body's group act at once, and reports the body's outcome. The transitions that were not drawn are
+    /// those before anybody has moved.
+    pub(super) fn add_outcome_at_once(&mut self, scratch: &mut Scratch) {
+        let mut section = FactSection::new("Outcome");
+        let start_m = self.position_m();
+        let slot = self.slot;
+        let tried = self.action().map(|action| {
+            (action, self.transition_results(action, |walk| self.cycle.lasting_result(walk, slot)))
+        });
+        self.cycle.act_at_once(scratch);
+        let made = scratch.group_moves.move_of(slot);
+        if let (Some((action, mut all)), Some(made)) = (tried, made)
+            && let Some(drawn) = made.transition
+        {
+            all[drawn].walk = made.result;
+            section = self.with_drawn_transition(section, &action.walks[drawn], &all[drawn]);
+            section = section.table(transition_table(action, &all, drawn));
+            self.draw_paths(start_m, action, drawn, &all[drawn]);
+        }
+        let section =
+            section.fact("next place", self.position_m()).fact("next heading", self.facing());
+        self.inspection.add_section(section);
+    }
+
+    /// Tries all transitions of an action; `result` says how far a walk gets.
+    fn transition_results(
+        &self,
+        action: &Action,
+        result: impl Fn(&StepPath) -> WalkResult,
+    ) -> Vec<TransitionResult> {
         let walks = action.walks.iter().zip(&action.probabilities);
-        let mut all: Vec<TransitionResult> = walks
-            .map(|(walk, &p)| TransitionResult { walk: self.cycle.walk_result(walk, self.slot), p })
-            .collect();
+        let mut all: Vec<TransitionResult> =
+            walks.map(|(walk, &p)| TransitionResult { walk: result(walk), p }).collect();
         let sum: f64 = all.iter().filter(|one| one.is_free()).map(|one| one.p).sum();
         if self.cycle.world.obstacle_rule == ObstacleRule::Renormalise && sum > 0.0 {
             for one in &mut all {

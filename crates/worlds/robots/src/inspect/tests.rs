@@ -76,7 +76,7 @@ fn nobody_is_told_of_who_is_not_there() {
 #[test]
 fn what_is_told_of_an_action_is_what_comes_of_it() {
     for rule in ["cut", "stay", "renormalise"] {
-        for policy in ["random", "fixed", "by_kind", "right_of_way", "rounds"] {
+        for policy in ["random", "fixed", "by_kind", "right_of_way", "rounds", "simultaneous"] {
             let order = match policy {
                 "by_kind" => "kind_order = [\"person\", \"robot\"]\n",
                 _ => "",
