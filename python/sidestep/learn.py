@@ -33,6 +33,7 @@ Columns = Mapping[str, Any] | str | os.PathLike[str] | Any
 
 MOTIONS = (
     "cycle", "robot", "action", "ahead_boxes", "left_boxes", "turn_deg", "contact", "effector", "box_m",
+    "delay_cycles",
 )  # fmt: skip
 READINGS = (
     "cycle", "robot", "sensor", "sensor_name", "true", "reported", "true_distance_m", "reported_distance_m", "true_class",
@@ -55,8 +56,9 @@ def effector(
     ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, :class:`sidestep.Table`): ``action``
     (``"forward"``, ``"left"``, ``"right"``, ``"stay"``), ``ahead_boxes`` and ``left_boxes``, displacements in boxes in the frame
     of the start, ``turn_deg``, positive to the left, and optionally ``contact`` (``"yes"`` where an obstacle stopped it: such rows
-    are skipped), ``robot``, a number by which robots that differ are found, and ``effector``. Or the folder of a run with
-    ``record.calibration = true``, which knows its box. ``box_m`` is the side of a box in meters: without it, a scenario that
+    are skipped), ``robot``, a number by which robots that differ are found, ``effector``, and ``delay_cycles``, the steps without
+    motion before the move, from which delays are learned. Or the folder of a run with ``record.calibration = true``, which
+    knows its box. ``box_m`` is the side of a box in meters: without it, a scenario that
     uses the result warns. ``name`` chooses one of several effectors, ``robots`` some robots. ``alpha`` is added to every count
     before rows become probabilities; every ``hold_out``-th move is held out to test the model, and so is each quarter of the
     time and each robot. No interval is given where a greater share of rows than ``max_unexplained`` is left out for a reason

@@ -3,6 +3,7 @@
 //! Source: the paper's action modeling (a set of transitions with probabilities per agent type and
 //! action, learned in free space) and its adaptation to places with obstacles.
 
+use crate::delay::DelayModel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -105,6 +106,8 @@ pub struct EffectorModel {
     pub actions: Vec<String>,
     /// Transitions per action.
     pub transitions: Vec<Vec<Transition>>,
+    /// How often actions are delayed; `None` where they never are.
+    pub delays: Option<DelayModel>,
 }
 
 impl EffectorModel {
@@ -119,6 +122,7 @@ impl EffectorModel {
                 vec![Transition::certain(vec![], 3)],
                 vec![Transition::certain(vec![], 0)],
             ],
+            delays: None,
         }
     }
 

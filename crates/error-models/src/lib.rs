@@ -2,6 +2,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod beam;
+pub mod delay;
 pub mod effector;
 mod policy;
 pub mod ray;

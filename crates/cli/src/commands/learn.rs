@@ -68,8 +68,8 @@ Examples:
   sidestep learn effector --run runs/hall
   sidestep learn effector --run runs/mixed --effector nomad --robots 0,1,2
 
-CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg; contact, robot, effector \
-and box_m where you have them. Moves that an obstacle cut short are left out: record logs in an open place. A run is recorded with \
+CSV columns: action (forward, left, right, stay), ahead_boxes, left_boxes, turn_deg; contact, robot, effector, \
+box_m and delay_cycles (steps between command and motion) where you have them. Moves that an obstacle cut short are left out: record logs in an open place. A run is recorded with \
 --set record.calibration=true. A bag is a file (.mcap, .db3, or .bag of ROS 1) or a folder of `ros2 bag record`; poses are of type \
 Odometry, PoseStamped, PoseWithCovarianceStamped, TransformStamped or TFMessage.";
 

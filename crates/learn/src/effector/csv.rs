@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::delays::{self, DelayReport, Pause};
 use super::events::{Events, MoveEvent, TurnEvent, nearest_turn};
 use super::grid_displacement::{
     FORWARD_CLASSES, GridDisplacement, OTHER_CLASS, forward_class, grid_displacements,
@@ -56,7 +57,8 @@ pub(super) fn learn(
     table: &CsvTable,
     options: &EffectorOptions,
 ) -> Result<LearnedEffector, InputError> {
-    let ParsedRows { free, rejected, damage, effector, box_m } = rows::parse(table, options)?;
+    let ParsedRows { free, pauses, rejected, damage, effector, box_m } =
+        rows::parse(table, options)?;
     let by_action: Vec<ActionLog> = (0..STANDARD_ACTIONS.len())
         .map(|action| ActionLog::from_displacements(&free, action))
         .collect();
@@ -75,11 +77,26 @@ pub(super) fn learn(
     report.warnings.extend(radian_warning(&free));
     report.warnings.extend(side_warning(&free));
     report.warnings.extend(meter_warning(&free, box_m));
+    if let Some(pauses) = &pauses {
+        add_delays(&mut report, pauses, estimate);
+    }
     report.judge_left_out(free.len() as u64);
+    let delays = pauses.as_deref().and_then(delays::model);
     Ok(LearnedEffector {
         report,
-        profile: EffectorProfile { box_m, ..profile(&by_action, estimate) },
+        profile: EffectorProfile { box_m, delays, ..profile(&by_action, estimate) },
     })
+}
+
+/// Adds the counts of delays to a report.
+fn add_delays(report: &mut EffectorReport, pauses: &[Pause], options: &EstimateOptions) {
+    let delays = DelayReport::new(pauses);
+    report.warnings.extend(delays.warning());
+    report.delays = Some(delays);
+    for table in delays::count_tables(pauses) {
+        report.probabilities.extend(table.estimates());
+        report.thin.extend(table.low_count_rows(options.thin_below));
+    }
 }
 
 /// Turns of so many degrees are usual where a quarter turn was commanded and the table has radians.
@@ -246,7 +263,7 @@ fn profile(logs: &[ActionLog], options: &EstimateOptions) -> EffectorProfile {
         let transitions = log.transitions(options.alpha, &mut assumed);
         actions.push((log.action.to_string(), transitions));
     }
-    EffectorProfile { box_m: None, actions, assumed, rule: RULE.to_string() }
+    EffectorProfile { box_m: None, delays: None, actions, assumed, rule: RULE.to_string() }
 }
 
 #[cfg(test)]

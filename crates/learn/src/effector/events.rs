@@ -118,6 +118,7 @@ impl Events {
         ];
         EffectorProfile {
             box_m: None,
+            delays: None,
             actions: actions.map(|(name, list)| (name.to_string(), list)).to_vec(),
             assumed,
             rule: rule.to_owned(),

@@ -21,6 +21,7 @@
 mod bag;
 mod carmen;
 mod csv;
+mod delays;
 mod events;
 pub mod grid_displacement;
 mod mrclam;
@@ -28,6 +29,7 @@ mod report;
 mod rows;
 mod transitions;
 
+pub use delays::DelayReport;
 pub use report::{EffectorReport, ForwardShares, TurnReport};
 pub use transitions::{EffectorProfile, ProfileTransition};
 
@@ -189,6 +191,8 @@ impl EffectorOptions {
 /// - `ahead_boxes`, `left_boxes`: displacement in boxes in the start frame, at most 8;
 /// - `turn_deg`: turn in degrees, + to the left;
 /// - optional `contact`, `yes` or `no`: whether an obstacle stopped it; such rows are left out;
+/// - optional `delay_cycles`: steps without motion between the command of the action and its beginning, 0 for none, at
+///   most 10,000; delays are learned from it, of rows with contact too;
 /// - optional `robot`: number of the robot, by which robots that differ are found;
 /// - optional `effector`: its name; with several in one file, [`EffectorOptions::effector`] chooses;
 /// - optional `box_m`: side of the boxes in meters.
@@ -223,8 +227,17 @@ pub fn learn_csv(
 }
 
 /// The columns of a table of displacements.
-const COLUMNS: &[&str] =
-    &["action", "ahead_boxes", "left_boxes", "turn_deg", "contact", "robot", "effector", "box_m"];
+const COLUMNS: &[&str] = &[
+    "action",
+    "ahead_boxes",
+    "left_boxes",
+    "turn_deg",
+    "contact",
+    "delay_cycles",
+    "robot",
+    "effector",
+    "box_m",
+];
 
 /// The warning on a table that does not say how long a box is.
 const NO_BOX: &str = "the table gives displacements in boxes and does not say how long a box is, so that a scenario \

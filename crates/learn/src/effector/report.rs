@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::delays::DelayReport;
 use super::grid_displacement::FORWARD_CLASSES;
 use crate::display::{self, TableHeading};
 use crate::holdout::HoldoutTest;
@@ -43,6 +44,9 @@ pub struct EffectorReport {
     /// Counts of every action's outcomes, phase-averaged, where the source names actions.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub actions: BTreeMap<String, BTreeMap<String, f64>>,
+    /// The pauses before actions; `None` where the source does not give them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delays: Option<DelayReport>,
     /// Lateral slip of odometry per step as a share of its length: standard deviation.
     pub lateral_slip_sd: Option<f64>,
     /// The same as a robust spread, to which poses that jump add nothing: 1.4826 times the median
@@ -128,10 +132,22 @@ impl fmt::Display for EffectorReport {
             let [robust, plain] = [100.0 * robust, 100.0 * plain];
             writeln!(f, "lateral slip: {robust:.2} % robust, {plain:.2} % with all that jump")?;
         }
+        if let Some(delays) = &self.delays {
+            write_delays(f, delays)?;
+        }
         let heading = TableHeading { row: "action", column: "outcome" };
         display::write_estimates(f, &self.probabilities, &heading)?;
         display::write_low_count_rows(f, &self.thin, self.estimate.thin_below)?;
         display::write_holdout_tests(f, &self.hold_out)
+    }
+}
+
+fn write_delays(f: &mut fmt::Formatter<'_>, delays: &DelayReport) -> fmt::Result {
+    let DelayReport { actions, delays, cycles, pairs, autocorrelation } = delays;
+    write!(f, "{delays} of {actions} actions were delayed, {cycles} cycles in all")?;
+    match autocorrelation {
+        Some(r) => writeln!(f, "; autocorrelation of pauses {r:.3} ({pairs} pairs of actions)"),
+        None => writeln!(f),
     }
 }
 

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::EffectorOptions;
+use super::delays::Pause;
 use crate::left_out;
+use sidestep_error_models::delay::MAX_DELAY_CYCLES;
 use sidestep_error_models::effector::STANDARD_ACTIONS;
 use sidestep_import::table::{CsvRow, CsvTable, Token};
 use sidestep_kernel::InputError;
@@ -32,6 +34,9 @@ pub(super) struct MeasuredDisplacement {
 pub(super) struct ParsedRows {
     /// Displacements that nothing stopped, in the order of time.
     pub(super) free: Vec<MeasuredDisplacement>,
+    /// The pause before each action, of rows with contact and of an effector's own actions too, in the order of time;
+    /// `None` where the table has none.
+    pub(super) pauses: Option<Vec<Pause>>,
     /// Number of rows that were left out, by cause.
     pub(super) rejected: BTreeMap<String, u64>,
     /// The warning on damaged rows.
@@ -48,6 +53,7 @@ pub(super) fn parse(table: &CsvTable, options: &EffectorOptions) -> Result<Parse
     let chosen = columns.choose(table, options)?;
     let mut parsed = ParsedRows {
         free: Vec::new(),
+        pauses: columns.delay.map(|_| Vec::new()),
         rejected: BTreeMap::new(),
         damage: None,
         effector: chosen.effector,
@@ -59,7 +65,11 @@ pub(super) fn parse(table: &CsvTable, options: &EffectorOptions) -> Result<Parse
         parsed.rejected.insert("damaged_row".to_string(), misfits);
     }
     for row in &chosen.rows {
-        let cause = match columns.read(table.place(), *row) {
+        let read = columns.read_with_pause(table.place(), *row);
+        let cause = match read.map(|(row, pause)| {
+            parsed.pauses.iter_mut().for_each(|pauses| pauses.extend(pause));
+            row
+        }) {
             Ok(Row::Free(displacement)) => {
                 parsed.free.push(displacement);
                 continue;
@@ -102,6 +112,7 @@ struct DisplacementColumns {
     left: usize,
     turn: usize,
     contact: Option<usize>,
+    delay: Option<usize>,
     robot: Option<usize>,
     effector: Option<usize>,
     box_m: Option<usize>,
@@ -129,6 +140,7 @@ impl DisplacementColumns {
             left,
             turn,
             contact: table.find("contact"),
+            delay: table.find("delay_cycles"),
             robot: table.find("robot"),
             effector: table.find("effector"),
             box_m: table.find("box_m"),
@@ -220,13 +232,37 @@ impl DisplacementColumns {
         Ok(Some(OwnBox { word, side_m }))
     }
 
+    fn read_with_pause(
+        &self,
+        place: &str,
+        row: CsvRow<'_>,
+    ) -> Result<(Row, Option<Pause>), InputError> {
+        Ok((self.read(place, row)?, self.pause(place, row)?))
+    }
+
+    /// Returns the pause before an action, where the table has them.
+    fn pause(&self, place: &str, row: CsvRow<'_>) -> Result<Option<Pause>, InputError> {
+        let Some(word) = self.delay.map(|column| row.field(column)) else { return Ok(None) };
+        let cycles: u32 = word.integer(&place)?;
+        if cycles > MAX_DELAY_CYCLES {
+            let cause = format!("a delay of {cycles} cycles is more than a scenario takes");
+            let remedy = format!("give at most {MAX_DELAY_CYCLES}, or leave the row out");
+            return Err(word.error(&place, cause, &remedy));
+        }
+        Ok(Some(Pause { robot: self.robot(place, row)?, cycles }))
+    }
+
+    fn robot(&self, place: &str, row: CsvRow<'_>) -> Result<u32, InputError> {
+        self.robot.map_or(Ok(0), |column| row.field(column).integer(&place))
+    }
+
     fn read(&self, place: &str, row: CsvRow<'_>) -> Result<Row, InputError> {
         let Some(action) = action(place, row.field(self.action))? else {
             return Ok(Row::OwnAction);
         };
         self.own_box(&row)?;
         let displacement = MeasuredDisplacement {
-            robot: self.robot.map_or(Ok(0), |column| row.field(column).integer(&place))?,
+            robot: self.robot(place, row)?,
             action,
             ahead_boxes: parse_limited(place, row.field(self.ahead), MAX_BOXES)?,
             left_boxes: parse_limited(place, row.field(self.left), MAX_BOXES)?,

@@ -3,6 +3,7 @@
 use super::grid_displacement::{FORWARD_CLASSES, GridDisplacement};
 use crate::CountTable;
 use crate::counts::{rounded, smooth};
+use sidestep_error_models::delay::DelayModel;
 use sidestep_error_models::effector::{EffectorModel, Side, Transition};
 
 /// An effector in the form of a profile; the probabilities of each action sum to 1.
@@ -12,6 +13,8 @@ pub struct EffectorProfile {
     pub box_m: Option<f64>,
     /// The transitions of each action, by its name; the first transition is the intended one.
     pub actions: Vec<(String, Vec<ProfileTransition>)>,
+    /// How often actions are delayed; `None` where the log does not say, or none was.
+    pub delays: Option<DelayModel>,
     /// Actions without any event, and the transitions that were assumed for them.
     pub assumed: Vec<String>,
     /// The rule by which events became transitions.
@@ -31,7 +34,11 @@ impl EffectorProfile {
     /// # Panics
     /// When a path has a letter other than `F`, `B`, `L` and `R`.
     pub fn model(&self, name: &str) -> EffectorModel {
-        let mut model = EffectorModel { name: name.into(), ..EffectorModel::perfect() };
+        let mut model = EffectorModel {
+            name: name.into(),
+            delays: self.delays.clone(),
+            ..EffectorModel::perfect()
+        };
         for (action, learned) in &self.actions {
             let transitions = learned.iter().map(ProfileTransition::transition).collect();
             match model.actions.iter().position(|known| known == action) {

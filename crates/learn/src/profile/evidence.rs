@@ -90,6 +90,13 @@ pub(super) fn effector_evidence(model: &LearnedEffector) -> Table {
     if let Some(turns) = &report.turns {
         table["turns"] = count(turns.n as f64).into();
     }
+    if let Some(delays) = &report.delays {
+        table["delayed_actions"] = count(delays.delays as f64).into();
+        table["actions_with_pause"] = count(delays.actions as f64).into();
+        if let Some(correlation) = delays.autocorrelation {
+            table["pause_autocorrelation"] = value(round_to_six(correlation));
+        }
+    }
     if let Some(sd) = report.lateral_slip_sd {
         table["lateral_slip_sd"] = value(round_to_six(sd));
     }

@@ -11,6 +11,7 @@ use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value, value};
 
 use super::effector::{LearnedEffector, ProfileTransition};
 use super::sensor::{BeamFit, LearnedSensor, NamedRow, SensorProfile};
+use sidestep_error_models::delay::DelayModel;
 use sidestep_kernel::InputError;
 use sidestep_scenario::FORMAT;
 
@@ -163,7 +164,24 @@ fn effector(model: &LearnedEffector) -> Table {
     for (action, transitions) in &model.profile.actions {
         section[action] = value(Array::from_iter(transitions.iter().map(transition)));
     }
+    if let Some(model) = &model.profile.delays {
+        section["delays"] = Item::Table(delays(model));
+    }
     section["evidence"] = Item::Table(evidence::effector_evidence(model));
+    section
+}
+
+fn delays(model: &DelayModel) -> Table {
+    let mut section = Table::new();
+    section["p"] = value(model.p);
+    section["per"] = value(model.per.name());
+    let durations = model.durations.iter().map(|duration| {
+        let mut fields = InlineTable::new();
+        fields.insert("cycles", i64::from(duration.cycles).into());
+        fields.insert("p", duration.p.into());
+        Value::from(fields)
+    });
+    section["durations"] = value(Array::from_iter(durations));
     section
 }
 

@@ -20,7 +20,8 @@ const SCENARIOS: [(&str, &str); 3] = [
     (
         "robots",
         "[map]\nascii = \"....\\n....\"\n[robots]\ncount = 1\nsensors = [\"sonar-8\", \"lidar\"]\n\
-         effector = \"nomad\"\n[record]\ncalibration = true\n[sensors.lidar]\nbearings_deg = [0]\nrange_m = 1.0\n\
+         effector = \"late\"\n[effectors.late]\nforward = [{ p = 1, path = \"F\" }]\n\
+         delays = { p = 0.1, min = 1, max = 2 }\n[record]\ncalibration = true\n[sensors.lidar]\nbearings_deg = [0]\nrange_m = 1.0\n\
          observations = [\"nothing\", \"wall\"]\ndesignates = { robot = \"wall\" }\n\
          beam = { hit = 1, short = 0, max = 0, random = 0, sigma_hit_m = 0.1, lambda_short_per_m = 1 }\n",
     ),

@@ -139,6 +139,49 @@ fn an_effector_comes_back_from_the_log_of_its_run() {
     assert!((two_ahead - slip).abs() < 1e-12, "{two_ahead} for {slip}");
 }
 
+/// A hall in which robots with known delays go about.
+fn delayed() -> Source {
+    let map = format!("{}\n", ".".repeat(60)).repeat(60);
+    let text = format!(
+        "format = 1\nworld = \"robots\"\nseed = 9\n\
+         record = {{ trajectories = false, events = false, calibration = true }}\n\
+         [map]\nbox_size_m = 0.25\nascii = \"\"\"\n{map}\"\"\"\n\
+         [robots]\ncount = 100\neffector = \"wheels\"\nbehaviour = {{ kind = \"random\" }}\n{EFFECTOR}\n\
+         [effectors.wheels.delays]\np = 0.1\nmin = 1\nmax = 4\n"
+    );
+    Source::new("delayed.toml", text, "")
+}
+
+#[test]
+fn delays_come_back_from_the_log_of_their_run() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let csv = record(&delayed(), 600, "motions", folder.path());
+    let learned = effector::from_csv(&csv, &EffectorOptions::default()).unwrap();
+    let known = [("delays", "action", "delayed", 0.1)];
+    let lengths = ["1", "2", "3", "4"].map(|cycles| ("delay_cycles", "delayed", cycles, 0.25));
+    for (table, row, column, p) in known.into_iter().chain(lengths) {
+        assert_recovered(&learned.report.probabilities, table, &[(row, column, p)]);
+    }
+    let delays = learned.report.delays.expect("the log has pauses");
+    // Independent pauses: within 3.3 standard errors.
+    let limit = Z / (delays.pairs as f64).sqrt();
+    assert!(delays.autocorrelation.expect("pauses differ").abs() < limit, "{delays:?}");
+
+    // The profile that was learned delays robots as often.
+    let text = profile::with_effector("p", &profile::empty("halls"), "wheels", &learned).unwrap();
+    std::fs::write(folder.path().join("learned.toml"), text).expect("a temporary file");
+    let own = delayed().text.split("[effectors").next().expect("a text").to_string();
+    let loaded = own.replace("seed = 9\n", "seed = 10\nprofiles = [\"learned.toml\"]\n");
+    let source = Source::new("loaded.toml", loaded, folder.path());
+    let mut run = robots_run(&source, 2).unwrap_or_else(|e| panic!("{e}"));
+    run.advance(600);
+    let total = run.metrics().total;
+    // 2.5 cycles in each tenth action.
+    let per_action = total.delayed_cycles as f64 / total.actions as f64;
+    assert!((per_action - 0.25).abs() < 0.02, "{per_action} cycles an action");
+    assert_eq!(total.actions + total.delayed_cycles, 100 * 600);
+}
+
 #[test]
 fn a_sensor_comes_back_from_the_log_of_its_run() {
     let folder = tempfile::tempdir().expect("a temporary folder");

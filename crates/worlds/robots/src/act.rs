@@ -303,6 +303,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             left,
             quarter_turns: if result.contact.is_none() { walk.turn } else { 0 },
             contact: result.contact.is_some(),
+            delay_cycles: self.state.delays.before_action(body.id),
         });
     }
 }

@@ -112,7 +112,7 @@ pub(super) fn motion_table(world: &RobotsWorld) -> Table<MotionSample> {
         .collect();
     let of_robot: Vec<u32> =
         world.bodies.iter().map(|body| label_of_type[usize::from(body.ty)]).collect();
-    Table::new("motions")
+    let table = Table::new("motions")
         .with_about(error_notes(world))
         .u64("cycle", CYCLE_DESCRIPTION, |s: &MotionSample| s.cycle)
         .u32("robot", "entity id", |s| s.robot)
@@ -126,7 +126,12 @@ pub(super) fn motion_table(world: &RobotsWorld) -> Table<MotionSample> {
         .label("contact", "whether an obstacle cut it", ["no", "yes"], |s| u32::from(s.contact))
         .label("effector", "name of the robot's effector in the scenario", effectors, move |s| {
             of_robot[s.robot as usize]
-        })
+        });
+    if !world.has_delays {
+        return table;
+    }
+    let delay = "cycles for which the action was delayed before it began; only where an effector has delays";
+    table.u32("delay_cycles", delay, |s| s.delay_cycles)
 }
 
 /// Returns the names of the effectors of all robots, each once, sorted.

@@ -54,6 +54,16 @@ pub fn single_robot(compiled: &Compiled) -> Result<SingleRobot, InputError> {
         let remedy = "give one robot: [robots] with count = 1, or --set robots.count=1";
         return Err(InputError::new(source_name(compiled), cause, remedy));
     };
+    if model.body.delays.is_some() {
+        let effector = &model.body.effector.name;
+        let cause = format!(
+            "the robot's effector `{effector}` has delays, and the states of a chain do not say how long one goes on"
+        );
+        let remedy = format!(
+            "set p = 0 in [effectors.{effector}.delays], or --regime sensors, in which effectors do not err at all"
+        );
+        return Err(InputError::new(source_name(compiled), cause, remedy));
+    }
     Ok(robot(compiled, doors, body, model, size))
 }
 

@@ -100,6 +100,12 @@ impl<'a, T: OccupantWord> Inspector<'a, T> {
             .fact("heading", self.facing())
             .fact("due", timing.is_due(cycle.now))
             .fact("acts every", FactValue::number(f64::from(timing.period), "cycles"));
+        let section = if cycle.world.has_delays {
+            let remaining = cycle.state.delays.remaining(self.id);
+            section.fact("delayed for", FactValue::number(f64::from(remaining), "cycles"))
+        } else {
+            section
+        };
         let section = match &cycle.type_of(body).role {
             Role::Robot(_) => section.fact("last contact", self.last_contact()),
             _ => section,

@@ -23,6 +23,7 @@ mod calibration_rows;
 mod contact_remarks;
 mod cycle_context;
 pub mod decide;
+mod delay;
 pub mod exact;
 mod external;
 mod facts;
@@ -144,6 +145,8 @@ pub struct MotionSample {
     pub quarter_turns: u8,
     /// Whether an obstacle cut it short.
     pub contact: bool,
+    /// Cycles for which it was delayed.
+    pub delay_cycles: u32,
 }
 
 /// A worker's buffers and sums, kept between tasks.

@@ -29,6 +29,8 @@ metrics! {
         pub trips_under_way: u64 => "trips under way",
         /// Boxes that no robot had covered before.
         pub first_visits: u64 => "boxes covered for the first time",
+        /// Cycles in which a robot was delayed, of all robots; 0 unless an effector has delays.
+        pub delayed_cycles: u64 => "delays of all robots",
     }
 }
 
@@ -64,7 +66,8 @@ impl RobotsWorld {
         let body = state.body(id);
         let trips = u64::from(body.trips.get());
         Counters {
-            actions: self.bodies[id as usize].actions_before(cycle),
+            actions: self.bodies[id as usize].actions_before(cycle)
+                - u64::from(state.delays.missed(id)),
             contacts,
             contacts_by_kind,
             distance_m: f64::from(body.moves.get()) * self.map.box_size_m,
@@ -72,6 +75,7 @@ impl RobotsWorld {
             trip_cycles_mean: (trips > 0).then(|| body.trip_cycles.get() as f64 / trips as f64),
             trips_under_way: u64::from(self.is_on_trip(body)),
             first_visits: u64::from(body.first_visits.get()),
+            delayed_cycles: u64::from(state.delays.total(id)),
         }
     }
 
@@ -96,6 +100,7 @@ impl RobotsWorld {
             total.trips += one.trips;
             total.trips_under_way += one.trips_under_way;
             total.first_visits += one.first_visits;
+            total.delayed_cycles += one.delayed_cycles;
             for (kind, n) in one.contacts_by_kind {
                 *total.contacts_by_kind.entry(kind).or_default() += n;
             }

@@ -25,7 +25,9 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             frames.poses.set(index, PackedPose::new(body.position(), body.facing.get()));
         }
         // Most bodies act in every cycle, and their constant part need not be read.
-        let is_due = body.period == 1 || world.bodies[body.id as usize].is_due(self.now);
+        let is_turn = body.period == 1 || world.bodies[body.id as usize].is_due(self.now);
+        let is_delayed = world.has_delays && self.spend_delay(body, is_turn, scratch);
+        let is_due = is_turn && !is_delayed;
         if !is_due && world.radio.is_some() {
             // The word of a robot that does not decide goes on to the page that is read next.
             self.state.voices.record(body.id, self.now, None);

@@ -1,5 +1,5 @@
 //! Purposes of the random draws of this world. A purpose's number is part of the key of its draws: another
-//! number gives other runs. 5 is free.
+//! number gives other runs.
 
 use sidestep_kernel::stream::Purpose;
 
@@ -12,6 +12,8 @@ pub(crate) const DECIDE: Purpose = Purpose(3);
 /// An action: index 0 says which transition it ends in, index 1 is the body's priority
 /// in its conflict group.
 pub(crate) const ACT: Purpose = Purpose(4);
+/// Delays: index 0 has whether one starts, and how long it is.
+pub(crate) const DELAY: Purpose = Purpose(5);
 /// Random doors.
 pub(crate) const DOOR: Purpose = Purpose(6);
 /// Directions of people.

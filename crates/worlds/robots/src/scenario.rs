@@ -20,13 +20,16 @@ use super::policy::ConflictPolicy;
 use super::world::Regime;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
+use sidestep_error_models::delay::DelayEvent;
 use sidestep_map::UnknownPolicy;
 use sidestep_map::office::OfficeSpec;
-use sidestep_scenario::{FixedList, Fraction, LeftOpen, Number, Open, Positive, Sections, Spanned};
+use sidestep_scenario::{
+    FixedList, Fraction, LeftOpen, NonNegative, Number, Open, Positive, Sections, Spanned,
+};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use values::{BoxSide, PathSteps, Period, QuarterTurns, SideBoxes, StartPose};
+use values::{BoxSide, DelayCycles, PathSteps, Period, QuarterTurns, SideBoxes, StartPose};
 
 /// A whole robots scenario. Every key is described in `scenarios/robots/default.toml`.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -152,7 +155,51 @@ pub(super) type MatrixRows = BTreeMap<Spanned<String>, Spanned<Vec<f64>>>;
 #[derive(Debug, Clone, Default)]
 pub(super) struct EffectorSection {
     pub(super) box_m: Option<Positive>,
+    pub(super) delays: Option<Spanned<DelaySection>>,
     pub(super) actions: BTreeMap<String, Spanned<Vec<TransitionSection>>>,
+}
+
+/// How often a robot is delayed, and for how long: `min` and `max`, or `durations`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DelaySection {
+    /// Chance that a delay starts.
+    pub(super) p: Fraction,
+    /// What may start one.
+    #[serde(default)]
+    pub(super) per: DelayEvent,
+    /// Shortest delay in cycles.
+    pub(super) min: Option<DelayCycles>,
+    /// Longest delay in cycles.
+    pub(super) max: Option<DelayCycles>,
+    /// The distribution of durations between `min` and `max`.
+    pub(super) distribution: Option<Spanned<DelayDistribution>>,
+    /// Mean of a Gaussian, as a share of the way from `min` to `max`.
+    pub(super) mean_ratio: Option<Fraction>,
+    /// Standard deviation of a Gaussian, as a share of `max - min`.
+    pub(super) sd_ratio: Option<NonNegative>,
+    /// Durations with their probabilities.
+    pub(super) durations: Option<Spanned<Vec<DurationSection>>>,
+}
+
+/// A distribution of durations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum DelayDistribution {
+    /// All durations alike.
+    #[default]
+    Uniform,
+    /// A normal distribution, cut off at `min` and `max`.
+    Gaussian,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DurationSection {
+    /// Length of the delay.
+    pub(super) cycles: DelayCycles,
+    /// Its probability among all delays.
+    pub(super) p: Fraction,
 }
 
 /// Written by hand, because flattened maps lose the positions of their entries.
@@ -175,6 +222,7 @@ impl<'de> Deserialize<'de> for EffectorSection {
                 while let Some(key) = map.next_key::<String>()? {
                     match key.as_str() {
                         "box_m" => section.box_m = Some(map.next_value()?),
+                        "delays" => section.delays = Some(map.next_value()?),
                         "evidence" => drop(map.next_value::<toml::Table>()?),
                         _ => drop(section.actions.insert(key, map.next_value()?)),
                     }
@@ -193,6 +241,7 @@ impl JsonSchema for EffectorSection {
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let action = generator.subschema_for::<Vec<TransitionSection>>();
+        let delays = generator.subschema_for::<DelaySection>();
         let mut box_m = Positive::json_schema(generator);
         let words = "Side of the boxes that its tables were learned for.";
         box_m.insert("description".into(), words.into());
@@ -201,6 +250,7 @@ impl JsonSchema for EffectorSection {
             "type": "object",
             "properties": {
                 "box_m": box_m,
+                "delays": delays,
                 "evidence": { "type": "object", "description": words },
             },
             "additionalProperties": action,

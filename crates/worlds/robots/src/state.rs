@@ -3,6 +3,7 @@
 mod packed;
 
 use super::broadcast::BroadcastBuffer;
+use super::delay::DelayColumns;
 use super::policy::ConflictPolicy;
 use super::sensor::{FREE, WALL};
 use super::world::{Body, BodyType, RobotsWorld};
@@ -42,6 +43,8 @@ pub struct RobotsState {
     pub(crate) turns: AtomicColumn<u32>,
     /// The body that has entered each box in this cycle, as its slot plus 1, or 0; as `turns`.
     pub(crate) entered_by: AtomicColumn<u32>,
+    /// Delays of each robot; empty where no robot has any.
+    pub(crate) delays: DelayColumns,
     /// Last broadcast of each robot; empty without radio.
     pub(crate) voices: BroadcastBuffer,
     /// Poses at the start of each cycle, while a run is recorded.
@@ -134,7 +137,9 @@ pub struct BodyRecord {
     pub counts: [u32; 3],
     /// Cycles spent on completed trips, and the cycle in which the present one started.
     pub trip: [u64; 2],
-    /// Contacts by the number of the kind touched.
+    /// Contacts by the number of the kind touched; where some robots have delays, then four words of the body's delays:
+    /// the cycles left, those since the last action, those in all, and the turns missed. They stand here so that
+    /// checkpoints of worlds without delays do not depend on them.
     pub contacts: Vec<u32>,
 }
 
@@ -174,6 +179,7 @@ impl RobotsState {
             bids: (0..bids).map(|_| AtomicU64::new(0)).collect(),
             turns: columns(n),
             entered_by: columns(world.walls.len()),
+            delays: DelayColumns::new(if world.has_delays { n } else { 0 }),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
         }
@@ -192,6 +198,7 @@ impl RobotsState {
             bids: Box::default(),
             turns: self.turns.clone(),
             entered_by: self.entered_by.clone(),
+            delays: self.delays.clone(),
             voices: self.voices.clone(),
             frames: None,
         }
@@ -265,7 +272,10 @@ impl RobotsState {
             voice: self.voices.last_broadcast(body.id, cycle),
             counts: [body.moves.get(), body.first_visits.get(), body.trips.get()],
             trip: [body.trip_cycles.get(), body.trip_begun.get()],
-            contacts: (0..kinds).map(|kind| self.contacts.get(first_contact + kind)).collect(),
+            contacts: (0..kinds)
+                .map(|kind| self.contacts.get(first_contact + kind))
+                .chain(self.delays.words(body.id))
+                .collect(),
         }
     }
 
@@ -307,10 +317,12 @@ impl RobotsState {
         body.trips.set(trips);
         body.trip_cycles.set(record.trip[0]);
         body.trip_begun.set(record.trip[1]);
-        let first_contact = body.id as usize * world.kinds.len();
-        for (kind, &count) in record.contacts.iter().enumerate() {
+        let kinds = world.kinds.len();
+        let first_contact = body.id as usize * kinds;
+        for (kind, &count) in record.contacts.iter().take(kinds).enumerate() {
             self.contacts.set(first_contact + kind, count);
         }
+        self.delays.restore(body.id, record.contacts.get(kinds..).unwrap_or_default());
         body.anchor.set(world.grid_position(record.at.0, record.at.1).word());
         if !self.is_open_door(world, slot) {
             self.occupy(world, slot);
@@ -337,6 +349,7 @@ impl RobotsState {
             + std::mem::size_of_val(&*self.slot_of_id)
             + self.contacts.heap_bytes()
             + self.turns.heap_bytes()
+            + self.delays.heap_bytes()
             + self.voices.heap_bytes();
         let boxes = self.floor.heap_bytes()
             + self.visited.heap_bytes()

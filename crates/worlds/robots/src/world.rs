@@ -3,6 +3,7 @@
 use super::action::Action;
 use super::alias_table::{AliasTable, RowIndex};
 use super::decide::{Behaviour, Sector};
+use super::delay::Delays;
 use super::effector::{EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
 use super::sensor::{Reading, SensorModel};
@@ -111,6 +112,8 @@ pub struct RobotsWorld {
     pub(super) robots: Vec<EntityId>,
     /// Whether there are robots that ask each other to make room.
     pub(super) has_requests: bool,
+    /// Whether there are robots that may be delayed.
+    pub(super) has_delays: bool,
     /// The order in which states store the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
@@ -225,6 +228,8 @@ pub struct RobotBody {
     pub effector: EffectorModel,
     /// The effector on this body, see [`BodyType::actions`].
     pub(crate) actions: Arc<[Action]>,
+    /// Its delays, where there are any in this regime.
+    pub(crate) delays: Option<Delays>,
 }
 
 /// A sensor on a body of a given size, with the boxes of its beams at every heading.

@@ -27,7 +27,9 @@ impl<T: OccupantWord> Inspector<'_, T> {
     pub(super) fn add_percept(&mut self, scratch: &mut Scratch) {
         let body = self.cycle.body(self.slot);
         let Role::Robot(model) = &self.cycle.type_of(body).role else { return };
-        let is_due = self.cycle.world.bodies[self.id as usize].is_due(self.cycle.now);
+        let is_turn = self.cycle.world.bodies[self.id as usize].is_due(self.cycle.now);
+        let is_delayed = self.cycle.delay_cycles(body, is_turn) > 0;
+        let is_due = is_turn && !is_delayed;
         let before = super::super::perceive::memory_of(body);
         let (decision, after) = self.cycle.decision(model, self.slot, scratch);
         self.add_readings(model, &scratch.readings);
@@ -37,6 +39,8 @@ impl<T: OccupantWord> Inspector<'_, T> {
         let section = FactSection::new("Decides");
         let section = if is_due {
             with_decision(section, model, decision)
+        } else if is_delayed {
+            section.fact("action", "none: it is delayed")
         } else {
             section.fact("action", "none: it is not its turn")
         };

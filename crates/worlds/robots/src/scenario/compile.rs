@@ -208,6 +208,7 @@ impl<'a> Compiler<'a> {
         let rows = self.map.height() + 2 * self.border;
         let radio = self.radio();
         let has_requests = self.has_requests();
+        let has_delays = self.has_delays();
         let kind_rank = self.kind_rank()?;
         let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
@@ -223,6 +224,7 @@ impl<'a> Compiler<'a> {
             teams: Arc::default(),
             robots,
             has_requests,
+            has_delays,
             storage: order,
             streams: self.streams,
             border: self.border,
@@ -260,6 +262,13 @@ impl<'a> Compiler<'a> {
     }
 
     /// Returns whether some robots ask each other to make room.
+    fn has_delays(&self) -> bool {
+        self.types.iter().any(|ty| match &ty.role {
+            Role::Robot(model) => model.body.delays.is_some(),
+            Role::Mover(_) | Role::Door(_) => false,
+        })
+    }
+
     fn has_requests(&self) -> bool {
         self.types.iter().any(|ty| match &ty.role {
             Role::Robot(model) => model.behaviour.has_requests(),

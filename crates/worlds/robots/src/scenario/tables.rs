@@ -2,10 +2,16 @@
 
 use super::kinds::Kinds;
 use super::located_section::LocatedSection;
-use super::{EffectorSection, MatrixRows, SensorSection, TransitionSection};
+use super::{
+    DelayDistribution, DelaySection, DurationSection, EffectorSection, MatrixRows, SensorSection,
+    TransitionSection,
+};
 use crate::effector::{EffectorModel, STANDARD_ACTIONS, Transition};
 use crate::sensor::SensorModel;
 use sidestep_error_models::beam::BeamModel;
+use sidestep_error_models::delay::{
+    DelayDuration, DelayModel, gaussian_durations, uniform_durations,
+};
 use sidestep_kernel::InputError;
 use sidestep_kernel::distr::check_probability_row;
 use sidestep_scenario::{Spanned, suggestion};
@@ -335,7 +341,88 @@ pub(super) fn effector(
     if model.actions.len() > MAX_ACTIONS {
         return Err(at.error(span, "more than 120 actions", "give fewer"));
     }
+    model.delays = section.delays.as_ref().map(|section| delays(name, at, section)).transpose()?;
     Ok(model)
+}
+
+/// Checks the delays of an effector.
+fn delays(
+    name: &str,
+    at: &LocatedSection<EffectorSection>,
+    section: &Spanned<DelaySection>,
+) -> Result<DelayModel, InputError> {
+    let s = section.get_ref();
+    let durations = match &s.durations {
+        Some(list) => listed_durations(name, at, s, list),
+        None => drawn_durations(name, at, section),
+    };
+    Ok(DelayModel { p: s.p.get(), per: s.per, durations: durations? })
+}
+
+/// Returns the durations of a list, which stands alone.
+fn listed_durations(
+    name: &str,
+    at: &LocatedSection<EffectorSection>,
+    s: &DelaySection,
+    list: &Spanned<Vec<DurationSection>>,
+) -> Result<Vec<DelayDuration>, InputError> {
+    let is_alone = s.min.is_none() && s.max.is_none() && s.distribution.is_none();
+    if !is_alone || s.mean_ratio.is_some() || s.sd_ratio.is_some() {
+        let cause =
+            format!("the delays of effector `{name}` have `durations` beside a distribution");
+        let remedy = "leave out min, max, distribution, mean_ratio and sd_ratio, or `durations`";
+        return Err(at.error(list.span(), cause, remedy));
+    }
+    let row: Vec<f64> = list.get_ref().iter().map(|duration| duration.p.get()).collect();
+    check_probability_row(&row).map_err(|e| {
+        let cause = format!("the durations of the delays of effector `{name}`: {e}");
+        at.error(list.span(), cause, "make the probabilities `p` of its durations sum to 1")
+    })?;
+    let durations = list.get_ref().iter();
+    let cycles = durations.map(|duration| duration.cycles.get() as u32);
+    Ok(cycles.zip(row).map(|(cycles, p)| DelayDuration { cycles, p }).collect())
+}
+
+/// Returns the durations of a distribution.
+fn drawn_durations(
+    name: &str,
+    at: &LocatedSection<EffectorSection>,
+    section: &Spanned<DelaySection>,
+) -> Result<Vec<DelayDuration>, InputError> {
+    let s = section.get_ref();
+    let (Some(min), Some(max)) = (s.min, s.max) else {
+        let cause = format!("the delays of effector `{name}` do not say how long they are");
+        let remedy = "give min and max in cycles, e.g. min = 1 and max = 5, or durations = [{ cycles = 2, p = 1.0 }]";
+        return Err(at.error(section.span(), cause, remedy));
+    };
+    let [min, max] = [min, max].map(|cycles| cycles.get() as u32);
+    if min > max {
+        let cause = format!("the delays of effector `{name}` last from {min} to {max} cycles");
+        return Err(at.error(section.span(), cause, "give a `max` that is not below `min`"));
+    }
+    match s.distribution.as_ref().map(|kind| *kind.get_ref()).unwrap_or_default() {
+        DelayDistribution::Uniform if s.mean_ratio.is_some() || s.sd_ratio.is_some() => {
+            let cause = format!(
+                "the delays of effector `{name}` have a mean or a deviation that nothing uses"
+            );
+            let remedy = "leave out mean_ratio and sd_ratio, or add distribution = \"gaussian\"";
+            Err(at.error(section.span(), cause, remedy))
+        }
+        DelayDistribution::Uniform => Ok(uniform_durations(min, max)),
+        DelayDistribution::Gaussian => {
+            let (Some(mean), Some(sd)) = (s.mean_ratio, s.sd_ratio) else {
+                let cause = format!(
+                    "the Gaussian delays of effector `{name}` have no mean or no deviation"
+                );
+                let remedy =
+                    "give both as shares of max - min, e.g. mean_ratio = 0.5 and sd_ratio = 0.25";
+                return Err(at.error(section.span(), cause, remedy));
+            };
+            let width = f64::from(max - min);
+            let mean = f64::from(min) + mean.get() * width;
+            Ok(gaussian_durations(min, max, mean, sd.get() * width))
+        }
+    }
 }
 
 fn transition(t: &TransitionSection) -> Transition {

@@ -3,11 +3,14 @@
 use crate::effector::{self, MAX_PATH_STEPS};
 use serde::{Deserialize, Deserializer};
 use serde_json::{Value, json};
+use sidestep_error_models::delay::MAX_DELAY_CYCLES;
 use sidestep_scenario::{Integer, Rule, invalid_value, schema_by_hand};
 
 /// Boxes of a body's side: 64 of 0.25 m are 16 m, more than any body in a building, and each box of
 /// a body costs time in every action.
 pub(crate) type SideBoxes = Integer<1, 64>;
+/// Cycles of a delay.
+pub(crate) type DelayCycles = Integer<1, { MAX_DELAY_CYCLES as u64 }>;
 /// Cycles from one action to the next.
 pub(crate) type Period = Integer<1, { u32::MAX as u64 }>;
 

@@ -5,6 +5,7 @@ use super::bodies::{BodyGroup, GroupTypes, period_cycles};
 use super::random::UnlocatedError;
 use super::unused_keys::BEHAVIOURS;
 use super::*;
+use crate::delay::Delays;
 use sidestep_import::movingai::{ScenRow, load_scen};
 use sidestep_map::planning::Lanes;
 use std::path::PathBuf;
@@ -135,7 +136,8 @@ impl Compiler<'_> {
             actions.push(effector.transitions_of(action as u8, is_reliable));
         }
         let actions = actions_at_headings(&actions, (size, size), self.stride());
-        Ok(RobotBody { sectors, sensors, actions, effector })
+        let delays = effector.delays.as_ref().filter(|_| !is_reliable).and_then(Delays::new);
+        Ok(RobotBody { sectors, sensors, actions, effector, delays })
     }
 
     fn mounted_sensor(

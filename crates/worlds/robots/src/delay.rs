@@ -1,0 +1,178 @@
+//! Delays of robots: cycles in which one does nothing although its turn has come.
+
+use super::Scratch;
+use super::cycle_context::CycleContext;
+use super::purpose;
+use super::state::BodyState;
+use super::world::{RobotModel, Role};
+use sidestep_error_models::delay::{DelayEvent, DelayModel};
+use sidestep_kernel::distr::{Bernoulli, Categorical};
+use sidestep_kernel::space::OccupantWord;
+use sidestep_kernel::{AtomicColumn, EntityId};
+
+/// The delays of a robot type, prepared for drawing.
+#[derive(Debug)]
+pub(crate) struct Delays {
+    start: Bernoulli,
+    per: DelayEvent,
+    /// The lengths by the number that `duration` draws.
+    cycles: Vec<u32>,
+    duration: Categorical,
+}
+
+impl Delays {
+    /// Returns `None` for a model in which no delay ever starts. Its durations must be a distribution.
+    pub(crate) fn new(model: &DelayModel) -> Option<Self> {
+        let row: Vec<f64> = model.durations.iter().map(|duration| duration.p).collect();
+        let duration = Categorical::new(&row).ok()?;
+        (model.p > 0.0).then(|| Self {
+            start: Bernoulli::new(model.p),
+            per: model.per,
+            cycles: model.durations.iter().map(|duration| duration.cycles).collect(),
+            duration,
+        })
+    }
+
+    /// Returns the length of the delay that starts by these draws, 0 for none.
+    fn sample(&self, [start, duration, ..]: [u32; 4]) -> u32 {
+        if self.start.sample(start) { self.cycles[self.duration.sample(duration)] } else { 0 }
+    }
+}
+
+/// The delays of all bodies, by id; empty where no robot has any.
+#[derive(Debug, Clone)]
+pub(crate) struct DelayColumns {
+    /// Cycles for which the present delay goes on.
+    remaining: AtomicColumn<u32>,
+    /// Cycles of delay since the last action.
+    pause: AtomicColumn<u32>,
+    /// Cycles of delay in all.
+    total: AtomicColumn<u32>,
+    /// Turns that passed without an action because of a delay.
+    missed: AtomicColumn<u32>,
+    /// Cycles of delay before the action of this cycle; only within a cycle.
+    before_action: AtomicColumn<u32>,
+}
+
+impl DelayColumns {
+    /// Returns columns for this number of bodies; 0 where no robot has delays.
+    pub(crate) fn new(bodies: usize) -> Self {
+        let column = || AtomicColumn::filled(bodies, 0);
+        Self {
+            remaining: column(),
+            pause: column(),
+            total: column(),
+            missed: column(),
+            before_action: column(),
+        }
+    }
+
+    fn saved_columns(&self) -> [&AtomicColumn<u32>; 4] {
+        [&self.remaining, &self.pause, &self.total, &self.missed]
+    }
+
+    /// Returns the state of a body's delays in words; none where no robot has delays.
+    pub(crate) fn words(&self, id: EntityId) -> impl Iterator<Item = u32> {
+        let columns = self.saved_columns().into_iter().filter(|column| !column.is_empty());
+        columns.map(move |column| column.get(id as usize))
+    }
+
+    /// Takes over what [`Self::words`] returned.
+    pub(crate) fn restore(&self, id: EntityId, words: &[u32]) {
+        let columns = self.saved_columns().into_iter().filter(|column| !column.is_empty());
+        columns.zip(words).for_each(|(column, &word)| column.set(id as usize, word));
+    }
+
+    fn word_of(column: &AtomicColumn<u32>, id: EntityId) -> u32 {
+        if column.is_empty() { 0 } else { column.get(id as usize) }
+    }
+
+    /// Returns the cycles for which a body's delay goes on; 0 for one that is not delayed.
+    pub(crate) fn remaining(&self, id: EntityId) -> u32 {
+        Self::word_of(&self.remaining, id)
+    }
+
+    /// Returns the cycles in which a body was delayed so far.
+    pub(crate) fn total(&self, id: EntityId) -> u32 {
+        Self::word_of(&self.total, id)
+    }
+
+    /// Returns the number of turns that passed without an action because of a delay.
+    pub(crate) fn missed(&self, id: EntityId) -> u32 {
+        Self::word_of(&self.missed, id)
+    }
+
+    /// Returns the cycles for which the action that a body does in this cycle was delayed.
+    pub(crate) fn before_action(&self, id: EntityId) -> u32 {
+        Self::word_of(&self.before_action, id)
+    }
+
+    pub(crate) fn heap_bytes(&self) -> usize {
+        let saved: usize = self.saved_columns().iter().map(|column| column.heap_bytes()).sum();
+        saved + self.before_action.heap_bytes()
+    }
+}
+
+impl<'a, T: OccupantWord> CycleContext<'a, T> {
+    /// Returns the cycles for which a body is delayed, this one included: the rest of a delay, or one that starts now.
+    pub(super) fn delay_cycles(&self, body: &BodyState, is_due: bool) -> u32 {
+        let Some(model) = self.delayed_model(body) else { return 0 };
+        let Some(delays) = &model.body.delays else { return 0 };
+        let columns = &self.state.delays;
+        let id = body.id as usize;
+        let remaining = columns.remaining.get(id);
+        if remaining > 0 {
+            return remaining;
+        }
+        let may_start = match delays.per {
+            DelayEvent::Cycle => true,
+            // The action that comes after a delay has had its draw.
+            DelayEvent::Action => is_due && columns.pause.get(id) == 0,
+        };
+        if !may_start {
+            return 0;
+        }
+        delays.sample(self.world.streams.block(body.id, self.now, purpose::DELAY, 0))
+    }
+
+    /// Returns the model of a robot that may be delayed.
+    fn delayed_model(&self, body: &BodyState) -> Option<&'a RobotModel> {
+        match &self.type_of(body).role {
+            Role::Robot(model) => model.body.delays.is_some().then_some(model),
+            Role::Mover(_) | Role::Door(_) => None,
+        }
+    }
+
+    /// Counts a cycle of a delay, and returns whether the body is delayed in this cycle. A robot whose turn it is
+    /// perceives all the same.
+    pub(super) fn spend_delay(
+        &self,
+        body: &BodyState,
+        is_due: bool,
+        scratch: &mut Scratch,
+    ) -> bool {
+        let Some(model) = self.delayed_model(body) else { return false };
+        let cycles = self.delay_cycles(body, is_due);
+        let columns = &self.state.delays;
+        let id = body.id as usize;
+        if cycles == 0 {
+            if is_due {
+                columns.before_action.set(id, columns.pause.get(id));
+                columns.pause.set(id, 0);
+            }
+            return false;
+        }
+        columns.remaining.set(id, cycles - 1);
+        columns.pause.add(id, 1);
+        columns.total.add(id, 1);
+        columns.missed.add(id, u32::from(is_due));
+        // Nothing follows from the readings but the rows of a log.
+        if is_due && scratch.keep_readings {
+            self.sense(model, body, scratch);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;
