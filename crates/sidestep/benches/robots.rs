@@ -167,7 +167,7 @@ fn teams() {
 fn corridor() {
     let row = |c: &str| format!("{}\n", c.repeat(240));
     let art = format!("{}{}", row("."), row(".").repeat(5));
-    for policy in ["random", "rounds"] {
+    for policy in ["random", "rounds", "simultaneous"] {
         let text = format!(
             "format = 1\nworld = \"robots\"\nconflict_policy = \"{policy}\"\n[map]\nascii = \"\"\"\n{art}\"\"\"\n\
              [robots]\ncount = 1000\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n"

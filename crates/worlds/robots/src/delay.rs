@@ -1,13 +1,7 @@
 //! Delays of robots: cycles in which one does nothing although its turn has come.
 
-use super::Scratch;
-use super::cycle_context::CycleContext;
-use super::purpose;
-use super::state::BodyState;
-use super::world::{RobotModel, Role};
 use sidestep_error_models::delay::{DelayEvent, DelayModel};
 use sidestep_kernel::distr::{Bernoulli, Categorical};
-use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::{AtomicColumn, EntityId};
 
 /// The delays of a robot type, prepared for drawing.
@@ -33,8 +27,17 @@ impl Delays {
         })
     }
 
+    /// Returns whether a delay may start in a cycle; `pause` are the cycles of delay since the last action.
+    pub(crate) fn may_start(&self, is_due: bool, pause: u32) -> bool {
+        match self.per {
+            DelayEvent::Cycle => true,
+            // The action that comes after a delay has had its draw.
+            DelayEvent::Action => is_due && pause == 0,
+        }
+    }
+
     /// Returns the length of the delay that starts by these draws, 0 for none.
-    fn sample(&self, [start, duration, ..]: [u32; 4]) -> u32 {
+    pub(crate) fn sample(&self, [start, duration, ..]: [u32; 4]) -> u32 {
         if self.start.sample(start) { self.cycles[self.duration.sample(duration)] } else { 0 }
     }
 }
@@ -55,6 +58,27 @@ pub(crate) struct DelayColumns {
 }
 
 impl DelayColumns {
+    /// Counts a cycle of a delay that goes on for `cycles`, this one included.
+    pub(crate) fn spend(&self, id: EntityId, cycles: u32, is_due: bool) {
+        let id = id as usize;
+        self.remaining.set(id, cycles - 1);
+        self.pause.add(id, 1);
+        self.total.add(id, 1);
+        self.missed.add(id, u32::from(is_due));
+    }
+
+    /// Ends the pause before an action.
+    pub(crate) fn begin_action(&self, id: EntityId) {
+        let id = id as usize;
+        self.before_action.set(id, self.pause.get(id));
+        self.pause.set(id, 0);
+    }
+
+    /// Returns the cycles of delay since a body's last action.
+    pub(crate) fn pause(&self, id: EntityId) -> u32 {
+        Self::word_of(&self.pause, id)
+    }
+
     /// Returns columns for this number of bodies; 0 where no robot has delays.
     pub(crate) fn new(bodies: usize) -> Self {
         let column = || AtomicColumn::filled(bodies, 0);
@@ -112,67 +136,3 @@ impl DelayColumns {
         saved + self.before_action.heap_bytes()
     }
 }
-
-impl<'a, T: OccupantWord> CycleContext<'a, T> {
-    /// Returns the cycles for which a body is delayed, this one included: the rest of a delay, or one that starts now.
-    pub(super) fn delay_cycles(&self, body: &BodyState, is_due: bool) -> u32 {
-        let Some(model) = self.delayed_model(body) else { return 0 };
-        let Some(delays) = &model.body.delays else { return 0 };
-        let columns = &self.state.delays;
-        let id = body.id as usize;
-        let remaining = columns.remaining.get(id);
-        if remaining > 0 {
-            return remaining;
-        }
-        let may_start = match delays.per {
-            DelayEvent::Cycle => true,
-            // The action that comes after a delay has had its draw.
-            DelayEvent::Action => is_due && columns.pause.get(id) == 0,
-        };
-        if !may_start {
-            return 0;
-        }
-        delays.sample(self.world.streams.block(body.id, self.now, purpose::DELAY, 0))
-    }
-
-    /// Returns the model of a robot that may be delayed.
-    fn delayed_model(&self, body: &BodyState) -> Option<&'a RobotModel> {
-        match &self.type_of(body).role {
-            Role::Robot(model) => model.body.delays.is_some().then_some(model),
-            Role::Mover(_) | Role::Door(_) => None,
-        }
-    }
-
-    /// Counts a cycle of a delay, and returns whether the body is delayed in this cycle. A robot whose turn it is
-    /// perceives all the same.
-    pub(super) fn spend_delay(
-        &self,
-        body: &BodyState,
-        is_due: bool,
-        scratch: &mut Scratch,
-    ) -> bool {
-        let Some(model) = self.delayed_model(body) else { return false };
-        let cycles = self.delay_cycles(body, is_due);
-        let columns = &self.state.delays;
-        let id = body.id as usize;
-        if cycles == 0 {
-            if is_due {
-                columns.before_action.set(id, columns.pause.get(id));
-                columns.pause.set(id, 0);
-            }
-            return false;
-        }
-        columns.remaining.set(id, cycles - 1);
-        columns.pause.add(id, 1);
-        columns.total.add(id, 1);
-        columns.missed.add(id, u32::from(is_due));
-        // Nothing follows from the readings but the rows of a log.
-        if is_due && scratch.keep_readings {
-            self.sense(model, body, scratch);
-        }
-        true
-    }
-}
-
-#[cfg(test)]
-mod tests;

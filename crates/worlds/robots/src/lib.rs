@@ -24,6 +24,7 @@ mod contact_remarks;
 mod cycle_context;
 pub mod decide;
 mod delay;
+mod delayed_turn;
 pub mod exact;
 mod external;
 mod facts;

@@ -390,7 +390,7 @@ fn drawn_durations(
     section: &Spanned<DelaySection>,
 ) -> Result<Vec<DelayDuration>, InputError> {
     let s = section.get_ref();
-    let (Some(min), Some(max)) = (s.min, s.max) else {
+    let Some((min, max)) = s.min.zip(s.max) else {
         let cause = format!("the delays of effector `{name}` do not say how long they are");
         let remedy = "give min and max in cycles, e.g. min = 1 and max = 5, or durations = [{ cycles = 2, p = 1.0 }]";
         return Err(at.error(section.span(), cause, remedy));
@@ -410,7 +410,7 @@ fn drawn_durations(
         }
         DelayDistribution::Uniform => Ok(uniform_durations(min, max)),
         DelayDistribution::Gaussian => {
-            let (Some(mean), Some(sd)) = (s.mean_ratio, s.sd_ratio) else {
+            let Some((mean, sd)) = s.mean_ratio.zip(s.sd_ratio) else {
                 let cause = format!(
                     "the Gaussian delays of effector `{name}` have no mean or no deviation"
                 );

@@ -304,7 +304,8 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
         None
     }
 
-    /// Returns who keeps a body of a ring out of a box, none of which has moved yet.
+    /// Returns who keeps a body of a ring, in which none has moved yet, out of a box: whoever stays in it, would exchange
+    /// boxes with the body, or has a better draw for it.
     fn obstacle_in_ring(
         &self,
         index: usize,
@@ -315,9 +316,10 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
         let slot = group.moves[turn as usize].slot;
         let word = self.obstacle_now(index, slot);
         if let Some(word) = word {
-            let leaves = word != T::WALL
-                && self.floor.get(index) == word
-                && self.leaves_in_ring(index, word.slot(), slot, ring, group);
+            let leaves = self.floor.get(index) == word
+                && self.mover_in_ring(word, ring, group).is_some_and(|one| {
+                    !self.covers_at_end(one, index) && !self.enters_boxes_of(one, slot)
+                });
             if !leaves {
                 return Some(word);
             }
@@ -330,19 +332,13 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
         Some(T::from_body(group.moves[winner.turn as usize].slot))
     }
 
-    /// Returns whether a body of the ring leaves a box to another one, with which it may not exchange boxes.
-    fn leaves_in_ring(
-        &self,
-        index: usize,
-        slot: EntitySlot,
-        to: EntitySlot,
-        ring: &[u32],
-        group: &GroupMoves,
-    ) -> bool {
-        let turn = self.state.turns.get(slot as usize);
-        let is_in_ring = ring.binary_search(&turn).is_ok();
-        let one = &group.moves[turn as usize];
-        is_in_ring && !self.covers_at_end(one, index) && !self.enters_boxes_of(one, to)
+    /// Returns the move of what stands in a box, if that is a body of the ring.
+    fn mover_in_ring<'g>(&self, word: T, ring: &[u32], group: &'g GroupMoves) -> Option<&'g Move> {
+        if word == T::WALL {
+            return None;
+        }
+        let turn = self.state.turns.get(word.slot() as usize);
+        ring.binary_search(&turn).is_ok().then(|| &group.moves[turn as usize])
     }
 
     /// Returns whether a body covers a box after the steps that are known for it.
