@@ -18,7 +18,7 @@ const CHECKS: [(&str, &str); 3] = [
 
 /// Crates that are hot: they are shipped without checks, so their tests beside the code are built once more with checks.
 /// All other crates of ours have overflow checks in the shipped build, too (`Cargo.toml`), and are tested in it.
-const HOT: [&str; 9] = [
+const HOT: [&str; 10] = [
     "sidestep-airspace",
     "sidestep-arms",
     "sidestep-chain",
@@ -26,6 +26,7 @@ const HOT: [&str; 9] = [
     "sidestep-error-models",
     "sidestep-kernel",
     "sidestep-map",
+    "sidestep-planners",
     "sidestep-robots",
     "sidestep-rods",
 ];

@@ -1,0 +1,100 @@
+//! Speed of PIBT where each agent gets a new goal when it arrives.
+//!
+//! `cargo bench -p sidestep-planners`; CPU time of a step, and goals reached per step. A tenth of the boxes are walls.
+
+use cpu_time::ProcessTime;
+use sidestep_kernel::Seed;
+use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_planners::{ActionModel, FreeSpace, GridPose, Pibt, PibtConfig, PibtState};
+
+/// Boxes of a floor of 200 x 200 with scattered walls, of which none encloses another.
+const SIDE: u32 = 200;
+
+const WALLS: Purpose = Purpose(10);
+const GOALS: Purpose = Purpose(11);
+
+struct Fleet {
+    poses: Vec<GridPose>,
+    goals: Vec<Option<(u32, u32)>>,
+    streams: Streams,
+    /// Number of goals drawn so far.
+    draws: u64,
+    places: Vec<(u32, u32)>,
+}
+
+impl Fleet {
+    fn new(free: &FreeSpace, agents: usize) -> Self {
+        let boxes = (0..SIDE).flat_map(|row| (0..SIDE).map(move |col| (col, row)));
+        let places: Vec<_> = boxes.filter(|&(col, row)| free.is_free(col, row)).collect();
+        let stride = places.len() / agents;
+        let start = |agent: usize| places[agent * stride];
+        let poses = (0..agents).map(start).map(|(col, row)| GridPose::new(col, row, 0)).collect();
+        let streams = Streams::new(Seed(1));
+        let mut fleet = Self { poses, goals: Vec::new(), streams, draws: 0, places };
+        fleet.goals = (0..agents).map(|_| Some(fleet.next_goal())).collect();
+        fleet
+    }
+
+    fn next_goal(&mut self) -> (u32, u32) {
+        self.draws += 1;
+        let word = self.streams.block(0, self.draws, GOALS, 0)[0];
+        self.places[word as usize % self.places.len()]
+    }
+
+    /// Gives a new goal to each agent that arrived; returns how many did.
+    fn renew(&mut self) -> usize {
+        let mut arrivals = 0;
+        for agent in 0..self.poses.len() {
+            if Some(self.poses[agent].position()) == self.goals[agent] {
+                self.goals[agent] = Some(self.next_goal());
+                arrivals += 1;
+            }
+        }
+        arrivals
+    }
+}
+
+/// Pillars in every third row and column, a part of which is left out.
+fn floor() -> FreeSpace {
+    let streams = Streams::new(Seed(2));
+    FreeSpace::new(SIDE, SIDE, |col, row| {
+        let is_pillar = streams.block(col, u64::from(row), WALLS, 0)[0] % 10 < 9;
+        !(col % 3 == 1 && row % 3 == 1 && is_pillar)
+    })
+}
+
+fn measure(agents: usize, model: ActionModel) {
+    let free = floor();
+    let mut fleet = Fleet::new(&free, agents);
+    let config = PibtConfig { model, ..PibtConfig::default() };
+    let mut pibt = Pibt::new(&free, &vec![1; agents], config).expect("sizes are 1");
+    let mut state = PibtState::new(agents);
+    let mut advance = |fleet: &mut Fleet| {
+        let actions = pibt.step(&mut state, &fleet.poses, &fleet.goals).expect("goals are free");
+        for (pose, &action) in fleet.poses.iter_mut().zip(actions) {
+            *pose = pose.after(action).expect("on the floor");
+        }
+        fleet.renew()
+    };
+    let started = ProcessTime::now();
+    advance(&mut fleet);
+    let first_s = started.elapsed().as_secs_f64();
+    let steps = 300;
+    let started = ProcessTime::now();
+    let arrivals: usize = (0..steps).map(|_| advance(&mut fleet)).sum();
+    let step_s = started.elapsed().as_secs_f64() / f64::from(steps);
+    println!(
+        "{agents:>6} agents, {model:?}: first step {:.0} ms, then {:.2} ms ({:.0} steps/s), {:.1} goals per step",
+        1e3 * first_s,
+        1e3 * step_s,
+        1.0 / step_s,
+        arrivals as f64 / f64::from(steps)
+    );
+}
+
+fn main() {
+    for agents in [1000, 10_000] {
+        measure(agents, ActionModel::Turns);
+        measure(agents, ActionModel::Classical);
+    }
+}

@@ -1,0 +1,27 @@
+#![deny(clippy::disallowed_methods)]
+#![doc = include_str!("../README.md")]
+
+pub mod assignment;
+pub mod cbs;
+pub mod dependency_graph;
+mod descent;
+mod distances;
+mod graph;
+mod inheritance;
+mod instance;
+pub mod lacam;
+pub mod pibt;
+mod plan;
+mod pose;
+pub mod prioritized;
+mod safe_intervals;
+#[cfg(test)]
+mod tests;
+
+pub use dependency_graph::{DependencyGraph, Permission};
+pub use instance::{Agent, Bounds, Instance};
+pub use pibt::{Pibt, PibtConfig, PibtState};
+pub use plan::{Costs, Plan, PlanError};
+pub use pose::{Action, ActionModel, GridPose};
+pub use sidestep_kernel::{InputError, Seed};
+pub use sidestep_map::planning::FreeSpace;

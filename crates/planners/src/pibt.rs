@@ -1,0 +1,221 @@
+//! PIBT: the next action of thousands of agents, cycle by cycle, also where goals never end.
+//!
+//! See [`Pibt`]. The source is Okumura, Machida, Défago and Tamura 2022, "Priority inheritance with backtracking for
+//! iterative multi-agent path finding" (section 4), with the swap operation of Okumura 2023 ("Improving LaCAM",
+//! section 5). Agents with headings first turn and hold their box meanwhile, as in the default planner of the League of
+//! Robot Runners (Chan et al. 2024, section 4).
+
+use crate::graph::{Graphs, NONE};
+use crate::inheritance::{Inheritance, Member};
+use crate::instance::{Instance, check_sizes};
+use crate::plan::Plan;
+use crate::pose::{Action, ActionModel, GridPose};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_kernel::{InputError, Seed};
+use sidestep_map::planning::FreeSpace;
+
+/// Draws that decide between equal boxes.
+const TIES: Purpose = Purpose(1);
+/// Draws that decide between agents of one age.
+const RANKS: Purpose = Purpose(2);
+
+/// Steps for which an agent with a heading keeps its lot among equal boxes. If each step had its own, an agent could turn
+/// to and fro; two half turns and two steps are time enough.
+const STEPS_PER_LOT: u64 = 8;
+
+/// The planner: what it knows of the floor, and buffers. Its results depend on its arguments and on the [`PibtState`].
+#[derive(Debug, Clone)]
+pub struct Pibt {
+    engine: Inheritance,
+    model: ActionModel,
+    streams: Streams,
+    /// Decides between agents of one age.
+    ranks: Vec<u32>,
+    order: Vec<(u64, u32)>,
+    actions: Vec<Action>,
+    misplaced: Vec<u32>,
+}
+
+/// All that changes from step to step: to continue elsewhere, keep it.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct PibtState {
+    /// The number of steps so far.
+    pub step: u64,
+    /// The number of steps since each agent was last at a goal. The oldest agent has the highest priority.
+    pub ages: Vec<u32>,
+}
+
+impl PibtState {
+    /// Creates the state before the first step.
+    pub fn new(agents: usize) -> Self {
+        Self { step: 0, ages: vec![0; agents] }
+    }
+}
+
+/// The settings of [`Pibt`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PibtConfig {
+    /// The actions that agents have.
+    pub model: ActionModel,
+    /// The seed of the draws between equal boxes and agents of one age.
+    pub seed: Seed,
+    /// Most bytes kept for the directions to goals: half a byte per box and goal. It changes no result, but where it is
+    /// less than all present goals need, some are computed anew at each step.
+    pub max_cache_bytes: usize,
+}
+
+impl Default for PibtConfig {
+    fn default() -> Self {
+        Self { model: ActionModel::Turns, seed: Seed(0), max_cache_bytes: 512 << 20 }
+    }
+}
+
+impl Pibt {
+    /// Creates the planner of agents with bodies of these sizes on the free boxes of a floor.
+    ///
+    /// # Errors
+    /// When a size is 0.
+    pub fn new(free: &FreeSpace, sizes: &[u32], config: PibtConfig) -> Result<Self, InputError> {
+        check_sizes(sizes.iter().copied())?;
+        Ok(Self::from_graphs(Graphs::new(free, sizes.iter().copied()), config))
+    }
+
+    fn from_graphs(graphs: Graphs, config: PibtConfig) -> Self {
+        let agents = graphs.agents();
+        let streams = Streams::new(config.seed);
+        Self {
+            engine: Inheritance::new(graphs, config.model, config.max_cache_bytes),
+            model: config.model,
+            streams,
+            ranks: (0..agents as u32).map(|id| streams.block(id, 0, RANKS, 0)[0]).collect(),
+            order: Vec::with_capacity(agents),
+            actions: Vec::with_capacity(agents),
+            misplaced: Vec::new(),
+        }
+    }
+
+    /// Returns the next action of each agent, and advances the state by one step.
+    ///
+    /// Poses are where the agents are, or believe to be: they need not be those that the actions before led to. If all
+    /// agents carry out their actions, no two bodies overlap and no two agents swap. An agent whose body is in a wall,
+    /// outside the map or overlaps that of an agent with a lower number waits, and nobody enters its boxes
+    /// ([`Pibt::misplaced`]). An agent without a goal, or without a path to it, stays, but makes way.
+    ///
+    /// # Errors
+    /// When there are not as many poses, goals and ages as agents, or a goal is not free for the agent's body.
+    pub fn step(
+        &mut self,
+        state: &mut PibtState,
+        poses: &[GridPose],
+        goals: &[Option<(u32, u32)>],
+    ) -> Result<&[Action], InputError> {
+        self.check_lengths(&[
+            ("ages", state.ages.len()),
+            ("poses", poses.len()),
+            ("goals", goals.len()),
+        ])?;
+        self.engine.begin();
+        self.misplaced.clear();
+        for (agent, (&pose, &goal)) in poses.iter().zip(goals).enumerate() {
+            let member = self.member(agent, state.step, pose, goal)?;
+            let age = &mut state.ages[agent];
+            *age = if member.now == member.goal { 0 } else { age.saturating_add(1) };
+            if !self.engine.place(member, pose.position()) {
+                self.misplaced.push(agent as u32);
+            }
+        }
+        self.sort(&state.ages);
+        self.engine.run(self.order.iter().map(|&(_, agent)| agent));
+        self.engine.hold();
+        self.actions.clear();
+        self.actions.extend((0..poses.len()).map(|agent| self.engine.action(agent)));
+        for &agent in &self.misplaced {
+            self.actions[agent as usize] = Action::Wait;
+        }
+        state.step += 1;
+        Ok(&self.actions)
+    }
+
+    /// Returns the agents that waited in the last step because their body was in a wall, outside the map or overlapped
+    /// that of an agent with a lower number.
+    pub fn misplaced(&self) -> &[u32] {
+        &self.misplaced
+    }
+
+    fn check_lengths(&self, lengths: &[(&str, usize)]) -> Result<(), InputError> {
+        let agents = self.ranks.len();
+        match lengths.iter().find(|(_, len)| *len != agents) {
+            None => Ok(()),
+            Some((name, len)) => {
+                let cause = format!("has {len} entries for {agents} agents");
+                Err(InputError::new(*name, cause, "give one entry for each agent"))
+            }
+        }
+    }
+
+    fn member(
+        &self,
+        agent: usize,
+        step: u64,
+        pose: GridPose,
+        goal: Option<(u32, u32)>,
+    ) -> Result<Member, InputError> {
+        let graph = self.engine.graphs.of(agent);
+        let goal = match goal {
+            None => NONE,
+            Some(position) => graph.anchor(position).ok_or_else(|| {
+                let size = graph.size();
+                let cause = format!("a body of {size} x {size} boxes does not fit at {position:?}");
+                let remedy = "give a box (column, row) where the whole body is on free boxes";
+                InputError::new(format!("goals[{agent}]"), cause, remedy)
+            })?,
+        };
+        let lot = match self.model {
+            ActionModel::Turns => step / STEPS_PER_LOT,
+            ActionModel::Classical => step,
+        };
+        Ok(Member {
+            now: graph.node(pose).map_or(NONE, |node| node / 4),
+            heading: pose.heading % 4,
+            goal,
+            ties: self.streams.block(agent as u32, lot, TIES, 0),
+        })
+    }
+
+    /// Sorts the agents by age, the oldest first.
+    fn sort(&mut self, ages: &[u32]) {
+        self.order.clear();
+        for (agent, (&age, &rank)) in ages.iter().zip(&self.ranks).enumerate() {
+            self.order.push((u64::from(u32::MAX - age) << 32 | u64::from(rank), agent as u32));
+        }
+        self.order.sort_unstable();
+    }
+}
+
+/// Plans step by step until all agents are at their goals at once. Returns none if they are not after so many steps: PIBT
+/// is fast, but not complete.
+///
+/// The model is that of the problem.
+pub fn plan(instance: &Instance, config: PibtConfig, max_steps: usize) -> Option<Plan> {
+    let config = PibtConfig { model: instance.model(), ..config };
+    let mut pibt = Pibt::from_graphs(instance.graphs().clone(), config);
+    let mut poses: Vec<GridPose> = instance.agents().iter().map(|agent| agent.start).collect();
+    let goals: Vec<_> = instance.agents().iter().map(|agent| Some(agent.goal)).collect();
+    let mut state = PibtState::new(poses.len());
+    let mut paths: Vec<Vec<GridPose>> = poses.iter().map(|&pose| vec![pose]).collect();
+    let is_done = |poses: &[GridPose]| {
+        poses.iter().zip(&goals).all(|(pose, goal)| Some(pose.position()) == *goal)
+    };
+    while !is_done(&poses) {
+        if paths.first().is_none_or(|path| path.len() > max_steps) {
+            return None;
+        }
+        let actions = pibt.step(&mut state, &poses, &goals).ok()?;
+        for (agent, &action) in actions.iter().enumerate() {
+            poses[agent] = poses[agent].after(action)?;
+            paths[agent].push(poses[agent]);
+        }
+    }
+    Some(Plan::new(paths))
+}

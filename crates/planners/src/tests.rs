@@ -1,0 +1,9 @@
+//! Laws of all planners on small random floors, and the classic cases.
+
+mod cbs;
+mod dependency_graph;
+mod floors;
+mod joint_search;
+mod lacam;
+mod pibt;
+mod prioritized;

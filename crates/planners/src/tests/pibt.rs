@@ -1,0 +1,152 @@
+use super::floors::{check_step, draw, problems, small_agents};
+use crate::pibt::plan;
+use crate::{Action, ActionModel, GridPose, Pibt, PibtConfig, PibtState, Seed};
+use proptest::prelude::*;
+
+const MODELS: [ActionModel; 2] = [ActionModel::Turns, ActionModel::Classical];
+
+fn config(model: ActionModel, seed: u64) -> PibtConfig {
+    PibtConfig { model, seed: Seed(seed), ..PibtConfig::default() }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn no_step_has_a_conflict_whatever_the_bodies(
+        problem in problems(9, 3, 20), seed in any::<u64>(), max_cache_bytes in 0usize..200,
+    ) {
+        let config = PibtConfig { max_cache_bytes, ..config(problem.model, seed) };
+        let mut pibt = Pibt::new(&problem.free, &problem.sizes(), config).unwrap();
+        let mut state = PibtState::new(problem.agents.len());
+        let mut poses: Vec<GridPose> = problem.agents.iter().map(|agent| agent.start).collect();
+        for step in 0..30 {
+            // Goals move on from agent to agent of a size, some have none.
+            let goal_of = |index: usize| {
+                let other = &problem.agents[(index + step / 10) % problem.agents.len()];
+                let is_equal = other.size == problem.agents[index].size;
+                (is_equal && !(index + step / 7).is_multiple_of(5)).then_some(other.goal)
+            };
+            let goals: Vec<_> = (0..poses.len()).map(goal_of).collect();
+            let actions = pibt.step(&mut state, &poses, &goals).unwrap();
+            poses = check_step(&problem, &poses, actions);
+        }
+    }
+
+    #[test]
+    fn the_size_of_the_cache_changes_no_action(problem in problems(9, 2, 12), seed in any::<u64>()) {
+        let run = |max_cache_bytes| {
+            let config = PibtConfig { max_cache_bytes, ..config(problem.model, seed) };
+            plan(&problem.instance(), config, 40)
+        };
+        prop_assert_eq!(run(0), run(1 << 20));
+    }
+
+    #[test]
+    fn wrong_poses_make_agents_wait_and_nobody_enters_their_boxes(
+        problem in problems(8, 2, 12), seed in any::<u64>(),
+        wrong in proptest::collection::vec((0u32..10, 0u32..10), 12),
+    ) {
+        let config = config(problem.model, seed);
+        let mut pibt = Pibt::new(&problem.free, &problem.sizes(), config).unwrap();
+        let mut state = PibtState::new(problem.agents.len());
+        let poses: Vec<GridPose> = problem
+            .agents
+            .iter()
+            .zip(&wrong)
+            .map(|(agent, at)| GridPose::new(at.0, at.1, agent.start.heading))
+            .collect();
+        let goals: Vec<_> = problem.agents.iter().map(|agent| Some(agent.goal)).collect();
+        let actions = pibt.step(&mut state, &poses, &goals).unwrap().to_vec();
+        let covers = |agent: usize, pose: GridPose, at: (u32, u32)| {
+            let size = problem.agents[agent].size;
+            (pose.col..pose.col + size).contains(&at.0) && (pose.row..pose.row + size).contains(&at.1)
+        };
+        for &agent in pibt.misplaced() {
+            let agent = agent as usize;
+            prop_assert_eq!(actions[agent], Action::Wait);
+            for other in (0..poses.len()).filter(|&other| other != agent) {
+                let after = poses[other].after(actions[other]).unwrap();
+                for at in (0..12).flat_map(|col| (0..12).map(move |row| (col, row))) {
+                    let both = covers(agent, poses[agent], at) && covers(other, after, at);
+                    prop_assert!(!both || covers(other, poses[other], at));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn agents_rotate_in_a_full_circle() {
+    let circle = [[(0, 0), (1, 0)], [(1, 0), (1, 1)], [(1, 1), (0, 1)], [(0, 1), (0, 0)]];
+    for model in MODELS {
+        let instance = small_agents("..\n..", model, &circle);
+        let plan = plan(&instance, config(model, 1), 20).expect("all arrive");
+        assert_eq!(plan.validate(&instance), Ok(()));
+        if model == ActionModel::Classical {
+            assert_eq!(plan.steps(), 1);
+        }
+    }
+}
+
+#[test]
+fn two_agents_swap_in_a_corridor_with_a_pocket() {
+    for (art, model) in ["......\n###.##", "......\n#.####"]
+        .into_iter()
+        .flat_map(|art| MODELS.map(|model| (art, model)))
+    {
+        let ends = [[(0, 1), (5, 1)], [(5, 1), (0, 1)]];
+        let instance = small_agents(art, model, &ends);
+        let plan = plan(&instance, config(model, 1), 100).expect("all arrive");
+        assert_eq!(plan.validate(&instance), Ok(()));
+    }
+}
+
+#[test]
+fn agents_pass_each_other_at_a_t_junction() {
+    let art = "#####\n.....\n##.##\n##.##";
+    let ways = [[(0, 2), (4, 2)], [(4, 2), (0, 2)]];
+    for model in MODELS {
+        let instance = small_agents(art, model, &ways);
+        let plan = plan(&instance, config(model, 3), 200).expect("all arrive");
+        assert_eq!(plan.validate(&instance), Ok(()));
+    }
+}
+
+#[test]
+fn an_agent_turns_before_it_goes_and_one_behind_it_waits_for_that() {
+    let free = draw("...\n...");
+    let mut pibt = Pibt::new(&free, &[1, 1], config(ActionModel::Turns, 0)).unwrap();
+    let mut state = PibtState::new(2);
+    let poses = [GridPose::new(0, 0, 0), GridPose::new(1, 0, 0)];
+    let goals = [Some((1, 0)), Some((1, 1))];
+    let actions = pibt.step(&mut state, &poses, &goals).unwrap();
+    assert_eq!(actions, [Action::Wait, Action::TurnLeft]);
+    let poses = [poses[0], GridPose::new(1, 0, 1)];
+    let actions = pibt.step(&mut state, &poses, &goals).unwrap();
+    assert_eq!(actions, [Action::Forward, Action::Forward]);
+}
+
+#[test]
+fn a_chain_of_thousands_of_agents_moves_in_one_step() {
+    let agents = 5000;
+    let free = sidestep_map::planning::FreeSpace::new(agents + 1, 1, |_, _| true);
+    let mut pibt =
+        Pibt::new(&free, &vec![1; agents as usize], config(ActionModel::Turns, 0)).unwrap();
+    let poses: Vec<_> = (0..agents).map(|col| GridPose::new(col, 0, 0)).collect();
+    let goals = vec![Some((agents, 0)); agents as usize];
+    let actions = pibt.step(&mut PibtState::new(agents as usize), &poses, &goals).unwrap();
+    assert!(actions.iter().all(|&action| action == Action::Forward));
+}
+
+#[test]
+fn wrong_input_is_refused_with_its_place() {
+    let free = draw("..#");
+    assert!(Pibt::new(&free, &[0], PibtConfig::default()).is_err());
+    let mut pibt = Pibt::new(&free, &[1], PibtConfig::default()).unwrap();
+    let poses = [GridPose::new(0, 0, 0)];
+    let error = pibt.step(&mut PibtState::new(1), &poses, &[Some((2, 0))]).unwrap_err();
+    assert_eq!(error.place(), "goals[0]");
+    let error = pibt.step(&mut PibtState::new(1), &poses, &[]).unwrap_err();
+    assert_eq!(error.place(), "goals");
+}
