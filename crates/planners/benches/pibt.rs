@@ -1,11 +1,14 @@
-//! Speed of PIBT where each agent gets a new goal when it arrives.
+//! Speed of PIBT where each agent gets a new goal when it arrives, and of the first plan of LaCAM*.
 //!
 //! `cargo bench -p sidestep-planners`; CPU time of a step, and goals reached per step. A tenth of the boxes are walls.
 
 use cpu_time::ProcessTime;
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Purpose, Streams};
-use sidestep_planners::{ActionModel, FreeSpace, GridPose, Pibt, PibtConfig, PibtState};
+use sidestep_planners::lacam::{self, LacamConfig};
+use sidestep_planners::{
+    ActionModel, Agent, FreeSpace, GridPose, Instance, Pibt, PibtConfig, PibtState,
+};
 
 /// Boxes of a floor of 200 x 200 with scattered walls, of which none encloses another.
 const SIDE: u32 = 200;
@@ -92,7 +95,40 @@ fn measure(agents: usize, model: ActionModel) {
     );
 }
 
+/// Measures the first plan on a floor of 32 x 32 boxes, where starts and goals lie apart, and what a budget makes of it.
+fn measure_lacam(agents: usize, model: ActionModel) {
+    let free = FreeSpace::new(32, 32, |col, row| !(col % 4 == 1 && row % 4 == 1));
+    let boxes = (0..32u32 * 32).map(|index| (index % 32, index / 32));
+    let places: Vec<_> = boxes.filter(|&(col, row)| free.is_free(col, row)).collect();
+    // Both steps are coprime to the number of places, so that no place comes up twice.
+    let agent = |index: usize| {
+        let (col, row) = places[index * 7 % places.len()];
+        let goal = places[(index * 11 + 400) % places.len()];
+        Agent { size: 1, start: GridPose::new(col, row, 0), goal }
+    };
+    let all = (0..agents).map(agent).collect();
+    let instance = Instance::new(&free, model, all).expect("places are free");
+    for (budget, is_first_enough) in [(100_000, true), (1000, false)] {
+        let config =
+            LacamConfig { budget_expansions: budget, is_first_enough, ..LacamConfig::default() };
+        let started = ProcessTime::now();
+        let outcome = lacam::plan(&instance, config).expect("goals are reachable");
+        let time_s = started.elapsed().as_secs_f64();
+        let bounds = instance.bounds().expect("goals are reachable");
+        let gap = outcome.plan.map(|plan| bounds.gap(&plan.costs(&instance)));
+        println!(
+            "LaCAM*, {agents} agents, {model:?}: {} expansions, {:.0} ms, gap {gap:.2?}",
+            outcome.expansions,
+            1e3 * time_s
+        );
+    }
+}
+
 fn main() {
+    for agents in [100, 400] {
+        measure_lacam(agents, ActionModel::Turns);
+        measure_lacam(agents, ActionModel::Classical);
+    }
     for agents in [1000, 10_000] {
         measure(agents, ActionModel::Turns);
         measure(agents, ActionModel::Classical);

@@ -2,7 +2,7 @@
 //!
 //! A plan is safe only if all agents keep its times. What has to be kept instead is the order in which agents pass each
 //! box (Hönig, Kiesel, Tinka, Durham and Ayanian 2019, "Persistent and robust execution of MAPF schedules in warehouses",
-//! section IV: the action dependency graph). An agent that keeps it meets nobody, however late others are, and where
+//! the action dependency graph). An agent that keeps it meets nobody, however late others are, and where
 //! everybody goes on in the end, everybody arrives.
 
 use crate::graph::NONE;

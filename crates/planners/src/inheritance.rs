@@ -2,7 +2,7 @@
 //!
 //! An agent reserves the box that it likes best of those around it. Whoever stands there inherits its priority and has
 //! to find a box in turn, before anybody else; if it cannot, the agent tries its next box (Okumura et al. 2022, "Priority
-//! inheritance with backtracking for iterative multi-agent path finding", section 4, algorithm 1).
+//! inheritance with backtracking for iterative multi-agent path finding", algorithm 1).
 //!
 //! **Bodies of n x n boxes.** A body may have to push several others at once. Those pushed before the last one may not
 //! enter boxes of agents that wait for them, because these may still have to stay: so what was decided is never undone,
@@ -30,6 +30,8 @@ pub(crate) struct Member {
     pub(crate) goal: u32,
     /// Random bits for each direction, which decide between boxes that are equal otherwise.
     pub(crate) ties: [u32; 4],
+    /// Whether it may go away from its goal to let another one pass.
+    pub(crate) may_swap: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -288,7 +290,9 @@ impl Inheritance {
         };
         self.rank(&mut frame, Preference::Near);
         self.wishes[agent as usize] = self.first_direction(&frame);
-        frame.partner = self.swap_partner(agent, frame.candidates[0]);
+        if self.members[agent as usize].may_swap {
+            frame.partner = self.swap_partner(agent, frame.candidates[0]);
+        }
         if frame.partner != NONE {
             self.rank(&mut frame, Preference::Far);
             self.wishes[agent as usize] = self.first_direction(&frame);

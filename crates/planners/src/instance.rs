@@ -22,8 +22,8 @@ pub struct Agent {
 /// A problem: each agent has to go from its start to its goal, and to stay there.
 ///
 /// Bodies never overlap. A box that is left in a step can be entered in the same step, so that agents can follow each
-/// other and rotate in a circle, but two agents cannot swap their boxes (Stern et al. 2019, section 2.2: vertex and
-/// swapping conflicts).
+/// other and rotate in a circle, but two agents cannot swap their boxes (Stern et al. 2019, types of conflicts: vertex
+/// and swapping conflicts).
 #[derive(Debug, Clone)]
 pub struct Instance {
     graphs: Graphs,

@@ -228,6 +228,7 @@ impl<'a> Search<'a> {
                 heading: (node % 4) as u8,
                 goal: self.instance.goal_box(agent),
                 ties: self.streams.block(agent as u32, self.expansions, TIES, 0),
+                may_swap: true,
             };
             let position = self.instance.graph(agent).position(member.now);
             self.engine.place(member, position);
@@ -346,8 +347,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Adds a step between known configurations, and hands the lower cost on that it may give (algorithm 1, lines 21 to
-    /// 29).
+    /// Adds a step between known configurations, and hands the lower cost on that it may give (algorithm 1).
     fn connect(&mut self, from: u32, to: u32) {
         let successors = &mut self.configurations[from as usize].successors;
         if !successors.contains(&to) {

@@ -1,9 +1,9 @@
 //! PIBT: the next action of thousands of agents, cycle by cycle, also where goals never end.
 //!
 //! See [`Pibt`]. The source is Okumura, Machida, Défago and Tamura 2022, "Priority inheritance with backtracking for
-//! iterative multi-agent path finding" (section 4), with the swap operation of Okumura 2023 ("Improving LaCAM",
-//! section 5). Agents with headings first turn and hold their box meanwhile, as in the default planner of the League of
-//! Robot Runners (Chan et al. 2024, section 4).
+//! iterative multi-agent path finding" (algorithm 1), with the swap operation of Okumura 2023 ("Improving LaCAM for scalable
+//! eventually optimal multi-agent pathfinding"). Agents with headings first turn and hold their box meanwhile, as in the default planner of the League of
+//! Robot Runners (Chan et al. 2024).
 
 use crate::graph::{Graphs, NONE};
 use crate::inheritance::{Inheritance, Member};
@@ -23,6 +23,9 @@ const RANKS: Purpose = Purpose(2);
 /// Steps for which an agent with a heading keeps its lot among equal boxes. If each step had its own, an agent could turn
 /// to and fro; two half turns and two steps are time enough.
 const STEPS_PER_LOT: u64 = 8;
+
+/// Age at which agents first do without swaps: most swaps are over by then.
+const AGE_WITHOUT_SWAPS: u32 = 64;
 
 /// The planner: what it knows of the floor, and buffers. Its results depend on its arguments and on the [`PibtState`].
 #[derive(Debug, Clone)]
@@ -102,6 +105,10 @@ impl Pibt {
     /// outside the map or overlaps that of an agent with a lower number waits, and nobody enters its boxes
     /// ([`Pibt::misplaced`]). An agent without a goal, or without a path to it, stays, but makes way.
     ///
+    /// Where all bodies have one box and each two neighboring boxes lie on a circle, as on floors without dead ends, each
+    /// agent comes to its goal in the end, however many there are: theorem 1 of the paper for the classical model, with
+    /// headings it is only tested.
+    ///
     /// # Errors
     /// When there are not as many poses, goals and ages as agents, or a goal is not free for the agent's body.
     pub fn step(
@@ -118,9 +125,10 @@ impl Pibt {
         self.engine.begin();
         self.misplaced.clear();
         for (agent, (&pose, &goal)) in poses.iter().zip(goals).enumerate() {
-            let member = self.member(agent, state.step, pose, goal)?;
+            let mut member = self.member(agent, state.step, pose, goal)?;
             let age = &mut state.ages[agent];
             *age = if member.now == member.goal { 0 } else { age.saturating_add(1) };
+            member.may_swap = may_swap(*age);
             if !self.engine.place(member, pose.position()) {
                 self.misplaced.push(agent as u32);
             }
@@ -180,6 +188,7 @@ impl Pibt {
             heading: pose.heading % 4,
             goal,
             ties: self.streams.block(agent as u32, lot, TIES, 0),
+            may_swap: true,
         })
     }
 
@@ -191,6 +200,13 @@ impl Pibt {
         }
         self.order.sort_unstable();
     }
+}
+
+/// Returns whether an agent of an age may swap. Swaps are needed where two meet in a dead end, but an agent that always
+/// makes way for others may never arrive. So phases without and with swaps take turns, each twice as long as the one
+/// before: in the end one is long enough, and where each box lies on a circle, all agents arrive.
+fn may_swap(age: u32) -> bool {
+    age < AGE_WITHOUT_SWAPS || (age / AGE_WITHOUT_SWAPS).ilog2() % 2 == 1
 }
 
 /// Plans step by step until all agents are at their goals at once. Returns none if they are not after so many steps: PIBT

@@ -18,8 +18,8 @@ pub struct Costs {
     pub makespan: u32,
     /// The sum over agents of the steps until it is at its goal to stay.
     pub sum_of_costs: u64,
-    /// The sum over agents of the steps that do not both begin and end at its goal (Okumura 2023, "Improving LaCAM",
-    /// section 3): less than the sum of costs where an agent makes way at its goal.
+    /// The sum over agents of the steps that do not both begin and end at its goal (Okumura 2023, "Improving
+    /// LaCAM"): less than the sum of costs where an agent makes way at its goal.
     pub sum_of_loss: u64,
 }
 

@@ -34,10 +34,12 @@ pub enum Action {
 /// The actions that agents have. Each takes one time step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub enum ActionModel {
-    /// Forward, two turns and wait, as in the League of Robot Runners (Chan et al. 2024).
+    /// Forward, two turns and wait, as in the League of Robot Runners (Chan et al. 2024, "The League of Robot Runners
+    /// competition").
     #[default]
     Turns,
-    /// Four moves and wait, as in classical multi-agent path finding (Stern et al. 2019, section 2).
+    /// Four moves and wait, as in classical multi-agent path finding (Stern et al. 2019, "Multi-agent pathfinding: definitions, variants, and
+    /// benchmarks").
     Classical,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A body can be at a box as long as no other covers any of its boxes; a state is a node and one such interval, and of
 //! each state only the earliest arrival matters, because the agent can wait there (Phillips and Likhachev 2011, "SIPP:
-//! Safe interval path planning for dynamic environments", sections III and IV).
+//! Safe interval path planning for dynamic environments").
 
 use crate::distances::GoalDistances;
 use crate::graph::AnchorGraph;

@@ -58,6 +58,15 @@ fn a_circle_of_four_rotates_in_one_step() {
 }
 
 #[test]
+fn an_agent_enters_its_goal_after_the_one_that_still_has_to_pass_it() {
+    let ways = [[(2, 1), (2, 0)], [(0, 0), (4, 0)]];
+    let instance = small_agents("##.##\n.....", ActionModel::Classical, &ways);
+    let plan = plan(&instance, 100).unwrap().plan.expect("there is a plan");
+    assert_eq!(plan.validate(&instance), Ok(()));
+    assert_eq!(plan.costs(&instance).sum_of_costs, 3 + 4);
+}
+
+#[test]
 fn a_problem_without_a_solution_spends_its_budget() {
     let ends = [[(0, 0), (3, 0)], [(3, 0), (0, 0)]];
     let instance = small_agents("....", ActionModel::Classical, &ends);

@@ -1,4 +1,4 @@
-use super::floors::{check_step, draw, problems, small_agents};
+use super::floors::{Problem, agent, check_step, draw, problems, small_agents};
 use crate::pibt::plan;
 use crate::{Action, ActionModel, GridPose, Pibt, PibtConfig, PibtState, Seed};
 use proptest::prelude::*;
@@ -72,6 +72,53 @@ proptest! {
                     prop_assert!(!both || covers(other, poses[other], at));
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn a_body_that_may_still_have_to_stay_is_not_entered_by_those_it_pushes() {
+    // The large body pushes two agents. The first one could make way if the ring of agents rotated into the boxes that
+    // the large body leaves, but the second one cannot move at all.
+    let free = draw("...\n...\n...");
+    let ring = [(2, 1), (2, 2), (2, 0), (1, 0), (0, 0)];
+    let mut agents = vec![agent(2, (0, 1), (1, 1))];
+    agents.extend(ring.map(|at| agent(1, at, at)));
+    let problem = Problem { free, model: ActionModel::Classical, agents };
+    let config = config(problem.model, 0);
+    let mut pibt = Pibt::new(&problem.free, &problem.sizes(), config).unwrap();
+    let mut state = PibtState { step: 0, ages: vec![9, 0, 0, 0, 0, 0] };
+    let poses: Vec<GridPose> = problem.agents.iter().map(|agent| agent.start).collect();
+    let goals = [Some((1, 1)), None, None, None, None, None];
+    let actions = pibt.step(&mut state, &poses, &goals).unwrap();
+    assert_eq!(check_step(&problem, &poses, actions), poses);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(30))]
+
+    /// Theorem 1 of the paper: where each box lies on a circle, each agent comes to its goal in time.
+    #[test]
+    fn each_agent_comes_to_its_goal_where_there_are_circles(
+        seed in any::<u64>(), count in 2usize..24, goals in proptest::collection::vec((0u32..6, 0u32..5), 24),
+    ) {
+        for model in MODELS {
+            let free = sidestep_map::planning::FreeSpace::new(6, 5, |col, row| (col, row) != (2, 2));
+            let boxes = (0..30).map(|index| (index % 6, index / 6)).filter(|&at| at != (2, 2));
+            let mut poses: Vec<GridPose> =
+                boxes.take(count).map(|(col, row)| GridPose::new(col, row, 0)).collect();
+            let goals: Vec<_> = goals[..count].iter().map(|&at| Some(if at == (2, 2) { (0, 0) } else { at })).collect();
+            let mut pibt = Pibt::new(&free, &vec![1; count], config(model, seed)).unwrap();
+            let mut state = PibtState::new(count);
+            let mut has_arrived = vec![false; count];
+            for _ in 0..600 {
+                let actions = pibt.step(&mut state, &poses, &goals).unwrap();
+                for (agent, &action) in actions.iter().enumerate() {
+                    poses[agent] = poses[agent].after(action).unwrap();
+                    has_arrived[agent] |= Some(poses[agent].position()) == goals[agent];
+                }
+            }
+            prop_assert!(has_arrived.iter().all(|&arrived| arrived), "{:?} {:?}", model, has_arrived);
         }
     }
 }

@@ -67,6 +67,15 @@ fn an_agent_that_finds_no_path_is_planned_first() {
 }
 
 #[test]
+fn an_agent_leaves_its_box_in_the_step_in_which_another_one_enters_it() {
+    let ways = [[(0, 0), (4, 0)], [(1, 0), (1, 1)]];
+    let instance = small_agents("#.###\n.....", ActionModel::Classical, &ways);
+    let outcome = plan(&instance, 1).unwrap();
+    assert_eq!(outcome.order, [0, 1]);
+    assert_eq!(outcome.plan.map(|plan| plan.costs(&instance).sum_of_costs), Some(5));
+}
+
+#[test]
 fn no_order_is_tried_twice() {
     let ends = [[(0, 0), (3, 0)], [(3, 0), (0, 0)]];
     let instance = small_agents("....", ActionModel::Classical, &ends);
