@@ -3,13 +3,14 @@
 use crate::distances::GoalDistances;
 use crate::graph::{AnchorGraph, Graphs, NONE};
 use crate::pose::{ActionModel, GridPose};
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_map::planning::FreeSpace;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// An agent of a problem.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Agent {
     /// Side of its square body in boxes; all agents of a team have the same.
     pub size: u32,
@@ -179,7 +180,7 @@ fn check_heading(agent: usize, heading: u8) -> Result<(), InputError> {
 }
 
 /// Lower bounds of the costs of a problem's plans.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bounds {
     /// The longest of the shortest paths, in steps.
     pub makespan: u32,

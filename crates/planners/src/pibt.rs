@@ -45,14 +45,17 @@ pub struct Pibt {
 pub struct PibtState {
     /// The number of steps so far.
     pub step: u64,
-    /// The number of steps since each agent was last at a goal. The oldest agent has the highest priority.
+    /// The number of steps since each agent was last at its goal or got another one. The oldest agent has the highest
+    /// priority.
     pub ages: Vec<u32>,
+    /// The goals of the last step.
+    pub goals: Vec<Option<(u32, u32)>>,
 }
 
 impl PibtState {
     /// Creates the state before the first step.
     pub fn new(agents: usize) -> Self {
-        Self { step: 0, ages: vec![0; agents] }
+        Self { step: 0, ages: vec![0; agents], goals: vec![None; agents] }
     }
 }
 
@@ -119,6 +122,7 @@ impl Pibt {
     ) -> Result<&[Action], InputError> {
         self.check_lengths(&[
             ("ages", state.ages.len()),
+            ("last goals", state.goals.len()),
             ("poses", poses.len()),
             ("goals", goals.len()),
         ])?;
@@ -127,7 +131,9 @@ impl Pibt {
         for (agent, (&pose, &goal)) in poses.iter().zip(goals).enumerate() {
             let mut member = self.member(agent, state.step, pose, goal)?;
             let age = &mut state.ages[agent];
-            *age = if member.now == member.goal { 0 } else { age.saturating_add(1) };
+            // Whoever gets a new goal on arrival is never seen at the old one.
+            let is_served = member.now == member.goal || state.goals[agent] != goal;
+            *age = if is_served { 0 } else { age.saturating_add(1) };
             member.may_swap = may_swap(*age);
             if !self.engine.place(member, pose.position()) {
                 self.misplaced.push(agent as u32);
@@ -142,6 +148,7 @@ impl Pibt {
             self.actions[agent as usize] = Action::Wait;
         }
         state.step += 1;
+        state.goals.copy_from_slice(goals);
         Ok(&self.actions)
     }
 

@@ -3,16 +3,17 @@
 use crate::graph::NONE;
 use crate::instance::{Bounds, Instance};
 use crate::pose::GridPose;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The poses of each agent at each step, from step 0 on.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Plan {
     paths: Vec<Vec<GridPose>>,
 }
 
 /// The costs of a plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Costs {
     /// Steps until the last agent is at its goal to stay.
     pub makespan: u32,

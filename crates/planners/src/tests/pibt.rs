@@ -87,9 +87,9 @@ fn a_body_that_may_still_have_to_stay_is_not_entered_by_those_it_pushes() {
     let problem = Problem { free, model: ActionModel::Classical, agents };
     let config = config(problem.model, 0);
     let mut pibt = Pibt::new(&problem.free, &problem.sizes(), config).unwrap();
-    let mut state = PibtState { step: 0, ages: vec![9, 0, 0, 0, 0, 0] };
     let poses: Vec<GridPose> = problem.agents.iter().map(|agent| agent.start).collect();
     let goals = [Some((1, 1)), None, None, None, None, None];
+    let mut state = PibtState { step: 0, ages: vec![9, 0, 0, 0, 0, 0], goals: goals.to_vec() };
     let actions = pibt.step(&mut state, &poses, &goals).unwrap();
     assert_eq!(check_step(&problem, &poses, actions), poses);
 }
@@ -184,6 +184,24 @@ fn a_chain_of_thousands_of_agents_moves_in_one_step() {
     let goals = vec![Some((agents, 0)); agents as usize];
     let actions = pibt.step(&mut PibtState::new(agents as usize), &poses, &goals).unwrap();
     assert!(actions.iter().all(|&action| action == Action::Forward));
+}
+
+#[test]
+fn the_agent_that_was_longest_without_its_goal_has_priority_and_a_new_goal_ends_that() {
+    let free = draw("...\n###");
+    let mut pibt = Pibt::new(&free, &[1, 1], config(ActionModel::Classical, 0)).unwrap();
+    let poses = [GridPose::new(0, 1, 0), GridPose::new(2, 1, 0)];
+    let goals = vec![Some((1, 1)), Some((1, 1))];
+    for (ages, winner) in [([3, 7], 1), ([7, 3], 0)] {
+        let mut state = PibtState { step: 0, ages: ages.to_vec(), goals: goals.clone() };
+        let actions = pibt.step(&mut state, &poses, &goals).unwrap();
+        assert_ne!(actions[winner], Action::Wait);
+        assert_eq!(actions[1 - winner], Action::Wait);
+        assert_eq!(state.ages, ages.map(|age| age + 1));
+        let new_goals = [goals[0], Some((0, 1))];
+        pibt.step(&mut state, &poses, &new_goals).unwrap();
+        assert_eq!(state.ages, [ages[0] + 2, 0]);
+    }
 }
 
 #[test]
