@@ -14,7 +14,7 @@ use crate::pose::{Action, GridPose};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Permission<'a> {
     /// It has done all its actions.
-    Finished,
+    Complete,
     /// Somebody has to leave a box first.
     Wait,
     /// It may begin its next action.
@@ -99,7 +99,7 @@ impl DependencyGraph {
     pub fn permission(&self, agent: usize, progress: &[usize]) -> Permission<'_> {
         assert_eq!(progress.len(), self.actions.len(), "one number of done actions per agent");
         let Some(node) = self.actions[agent].get(progress[agent]) else {
-            return Permission::Finished;
+            return Permission::Complete;
         };
         if node.circle == NONE {
             let is_free = is_free(node, progress);
@@ -134,7 +134,7 @@ impl DependencyGraph {
     /// Returns who moves if an agent may, itself among them.
     fn movers(&self, agent: usize, progress: &[usize]) -> Option<Vec<u32>> {
         match self.permission(agent, progress) {
-            Permission::Finished | Permission::Wait => None,
+            Permission::Complete | Permission::Wait => None,
             Permission::Go => Some(vec![agent as u32]),
             Permission::GoTogether(circle) => Some(circle.to_vec()),
         }

@@ -106,7 +106,7 @@ impl Pibt {
     /// Poses are where the agents are, or believe to be: they need not be those that the actions before led to. If all
     /// agents carry out their actions, no two bodies overlap and no two agents swap. An agent whose body is in a wall,
     /// outside the map or overlaps that of an agent with a lower number waits, and nobody enters its boxes
-    /// ([`Pibt::misplaced`]). An agent without a goal, or without a path to it, stays, but makes way.
+    /// ([`Pibt::misplaced_agents`]). An agent without a goal, or without a path to it, stays, but makes way.
     ///
     /// Where all bodies have one box and each two neighboring boxes lie on a circle, as on floors without dead ends, each
     /// agent comes to its goal in the end, however many there are: theorem 1 of the paper for the classical model, with
@@ -154,7 +154,7 @@ impl Pibt {
 
     /// Returns the agents that waited in the last step because their body was in a wall, outside the map or overlapped
     /// that of an agent with a lower number.
-    pub fn misplaced(&self) -> &[u32] {
+    pub fn misplaced_agents(&self) -> &[u32] {
         &self.misplaced
     }
 

@@ -78,8 +78,8 @@ impl GridPose {
         match action {
             Action::Wait => Some(self),
             Action::Forward => self.neighbor(heading),
-            Action::TurnLeft => Some(Self { heading: (heading + 1) % 4, ..self }),
-            Action::TurnRight => Some(Self { heading: (heading + 3) % 4, ..self }),
+            Action::TurnLeft => Some(Self { heading: (heading % 4 + 1) % 4, ..self }),
+            Action::TurnRight => Some(Self { heading: (heading % 4 + 3) % 4, ..self }),
             Action::Move(direction) => self.neighbor(direction),
         }
     }
@@ -116,6 +116,7 @@ mod tests {
         let turn = |pose: GridPose| pose.after(Action::TurnLeft).unwrap();
         assert_eq!(turn(turn(turn(turn(start)))), start);
         assert_eq!(turn(start).after(Action::TurnRight), Some(start));
+        assert_eq!(turn(GridPose::new(0, 0, u8::MAX)).heading, 0);
     }
 
     #[test]

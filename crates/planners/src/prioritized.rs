@@ -21,7 +21,7 @@ pub struct PrioritizedOutcome {
     /// The last order in which agents were planned, the first one with the highest priority.
     pub order: Vec<usize>,
     /// The agent that found no path in the last order; none if there is a plan.
-    pub blocked: Option<usize>,
+    pub blocked_agent: Option<usize>,
     /// The number of orders that were tried.
     pub orders: u32,
 }
@@ -34,11 +34,11 @@ pub fn plan(instance: &Instance, max_orders: u32) -> Result<PrioritizedOutcome, 
     let distances = instance.distances()?;
     let mut order: Vec<usize> = (0..instance.agents().len()).collect();
     order.sort_by_key(|&agent| Reverse(distances[agent].steps(instance.start_node(agent))));
-    let mut outcome = PrioritizedOutcome { plan: None, order, blocked: None, orders: 0 };
+    let mut outcome = PrioritizedOutcome { plan: None, order, blocked_agent: None, orders: 0 };
     let mut tried = BTreeSet::new();
     while outcome.orders < max_orders {
         let mut next = outcome.order.clone();
-        if let Some(agent) = outcome.blocked {
+        if let Some(agent) = outcome.blocked_agent {
             put_first(&mut next, agent);
         }
         // What failed once fails again.
@@ -50,10 +50,10 @@ pub fn plan(instance: &Instance, max_orders: u32) -> Result<PrioritizedOutcome, 
         match plan_in_order(instance, &distances, &outcome.order) {
             Ok(plan) => {
                 outcome.plan = Some(plan);
-                outcome.blocked = None;
+                outcome.blocked_agent = None;
                 break;
             }
-            Err(agent) => outcome.blocked = Some(agent),
+            Err(agent) => outcome.blocked_agent = Some(agent),
         }
     }
     Ok(outcome)

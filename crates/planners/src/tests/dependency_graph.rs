@@ -15,7 +15,7 @@ fn execute(problem: &Problem, graph: &DependencyGraph, seed: u64) -> Option<Vec<
         let mut is_finished = true;
         for agent in 0..poses.len() {
             let movers = match graph.permission(agent, &progress) {
-                Permission::Finished => continue,
+                Permission::Complete => continue,
                 Permission::Wait => vec![],
                 Permission::Go => vec![agent as u32],
                 Permission::GoTogether(circle) => circle.to_vec(),
@@ -86,7 +86,7 @@ fn a_follower_waits_until_the_box_is_left() {
     assert_eq!(graph.permission(0, &[0, 0]), Permission::Wait);
     assert_eq!(graph.permission(1, &[0, 0]), Permission::Go);
     assert_eq!(graph.permission(0, &[0, 1]), Permission::Go);
-    assert_eq!(graph.permission(1, &[0, 1]), Permission::Finished);
+    assert_eq!(graph.permission(1, &[0, 1]), Permission::Complete);
     assert_eq!(graph.dependencies(0, 0).collect::<Vec<_>>(), [(1, 0)]);
 }
 

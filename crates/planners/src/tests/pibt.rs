@@ -62,7 +62,7 @@ proptest! {
             let size = problem.agents[agent].size;
             (pose.col..pose.col + size).contains(&at.0) && (pose.row..pose.row + size).contains(&at.1)
         };
-        for &agent in pibt.misplaced() {
+        for &agent in pibt.misplaced_agents() {
             let agent = agent as usize;
             prop_assert_eq!(actions[agent], Action::Wait);
             for other in (0..poses.len()).filter(|&other| other != agent) {

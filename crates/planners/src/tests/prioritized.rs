@@ -11,7 +11,7 @@ proptest! {
     fn plans_are_valid_whatever_the_bodies_and_cost_at_least_the_bound(problem in problems(9, 3, 10)) {
         let instance = problem.instance();
         let Ok(outcome) = plan(&instance, 10) else { return Ok(()) };
-        prop_assert_eq!(outcome.plan.is_none(), outcome.blocked.is_some());
+        prop_assert_eq!(outcome.plan.is_none(), outcome.blocked_agent.is_some());
         if let Some(plan) = outcome.plan {
             prop_assert_eq!(plan.validate(&instance), Ok(()));
             let bounds = instance.bounds().unwrap();
@@ -60,7 +60,7 @@ fn an_agent_that_finds_no_path_is_planned_first() {
     let ways = [[(6, 0), (0, 0)], [(1, 0), (4, 2)]];
     let instance = small_agents("####.##\n####.##\n.......", ActionModel::Classical, &ways);
     let outcome = plan(&instance, 1).unwrap();
-    assert_eq!((outcome.plan, outcome.blocked), (None, Some(1)));
+    assert_eq!((outcome.plan, outcome.blocked_agent), (None, Some(1)));
     let outcome = plan(&instance, 2).unwrap();
     assert_eq!(outcome.order, [1, 0]);
     assert_eq!(outcome.plan.expect("the other one waits").validate(&instance), Ok(()));
