@@ -95,7 +95,8 @@ fn measure(agents: usize, model: ActionModel) {
     );
 }
 
-/// Measures the first plan on a floor of 32 x 32 boxes, where starts and goals lie apart, and what a budget makes of it.
+/// Measures the first plan on a floor of 32 x 32 boxes, where starts and goals lie apart, and what a budget makes of
+/// it.
 fn measure_lacam(agents: usize, model: ActionModel) {
     let free = FreeSpace::new(32, 32, |col, row| !(col % 4 == 1 && row % 4 == 1));
     let boxes = (0..32u32 * 32).map(|index| (index % 32, index / 32));

@@ -1,7 +1,7 @@
 //! Who gets which task.
 //!
-//! Rows are agents and columns are tasks; a cost is any number, such as the steps to the task. Agents or tasks may be left
-//! over, and pairs without a path are never assigned.
+//! Rows are agents and columns are tasks; a cost is any number, such as the steps to the task. Agents or tasks may be
+//! left over, and pairs without a path are never assigned.
 
 /// The cost of each task for each agent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,8 +49,8 @@ impl CostMatrix {
 }
 
 /// Assigns as many tasks as possible at the lowest sum of costs, by the Hungarian method (Kuhn 1955; Munkres 1957) with
-/// shortest augmenting paths: time grows with the square of the smaller number times the larger one. Returns the task of
-/// each agent.
+/// shortest augmenting paths: time grows with the square of the smaller number times the larger one. Returns the task
+/// of each agent.
 pub fn kuhn_munkres(costs: &CostMatrix) -> Vec<Option<usize>> {
     let is_wide = costs.agents <= costs.tasks;
     let mut assignment = vec![None; costs.agents];
@@ -158,8 +158,8 @@ pub fn nearest(costs: &CostMatrix) -> Vec<Option<usize>> {
     (0..costs.agents).map(&mut choose).collect()
 }
 
-/// Gives each task in turn, the first one first, to the nearest agent without a task; of equal ones the first. Returns the
-/// task of each agent.
+/// Gives each task in turn, the first one first, to the nearest agent without a task; of equal ones the first. Returns
+/// the task of each agent.
 pub fn fifo(costs: &CostMatrix) -> Vec<Option<usize>> {
     let mut assignment = vec![None; costs.agents];
     for task in 0..costs.tasks {

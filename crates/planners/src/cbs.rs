@@ -1,8 +1,8 @@
 //! Conflict-based search: plans with the lowest sum of costs, for small teams.
 //!
 //! Each agent plans alone. Of the conflicts between their paths one is resolved in both ways, by a constraint on either
-//! agent, in a tree that is searched by cost (Sharon, Stern, Felner and Sturtevant 2015, "Conflict-based search for optimal
-//! multi-agent pathfinding", section 4). Of several conflicts it takes one that raises the cost in both ways,
+//! agent, in a tree that is searched by cost (Sharon, Stern, Felner and Sturtevant 2015, "Conflict-based search for
+//! optimal multi-agent pathfinding", section 4). Of several conflicts it takes one that raises the cost in both ways,
 //! if there is one (Boyarski et al. 2015, "ICBS": cardinal conflicts), which it finds by trying.
 
 use crate::distances::GoalDistances;

@@ -1,8 +1,8 @@
 //! Carrying out a plan although agents are late: who must have left a box before whom.
 //!
 //! A plan is safe only if all agents keep its times. What has to be kept instead is the order in which agents pass each
-//! box (Hönig, Kiesel, Tinka, Durham and Ayanian 2019, "Persistent and robust execution of MAPF schedules in warehouses",
-//! the action dependency graph). An agent that keeps it meets nobody, however late others are, and where
+//! box (Hönig, Kiesel, Tinka, Durham and Ayanian 2019, "Persistent and robust execution of MAPF schedules in
+//! warehouses", the action dependency graph). An agent that keeps it meets nobody, however late others are, and where
 //! everybody goes on in the end, everybody arrives.
 
 use crate::graph::NONE;
@@ -19,8 +19,8 @@ pub enum Permission<'a> {
     Wait,
     /// It may begin its next action.
     Go,
-    /// It may begin its next action together with these agents, who rotate in a circle: each enters the box that another
-    /// one leaves, so all have to move in one step.
+    /// It may begin its next action together with these agents, who rotate in a circle: each enters the box that
+    /// another one leaves, so all have to move in one step.
     GoTogether(&'a [u32]),
 }
 
@@ -177,8 +177,8 @@ impl DependencyGraph {
         }
     }
 
-    /// Finds the actions of each step that depend on each other in a circle. Dependencies lead from a step to an earlier
-    /// one or to the same, so a cycle lies within a step.
+    /// Finds the actions of each step that depend on each other in a circle. Dependencies lead from a step to an
+    /// earlier one or to the same, so a cycle lies within a step.
     fn find_circles(&mut self, steps: usize) {
         let mut by_step: Vec<Vec<(u32, u32)>> = vec![Vec::new(); steps + 1];
         for (agent, nodes) in self.actions.iter().enumerate() {

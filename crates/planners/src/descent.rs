@@ -126,8 +126,8 @@ impl DescentCache {
         index as u32
     }
 
-    /// Returns the field that was not used for longest. Where all were used in this step, it is the last one: if it were
-    /// the first, the next step would miss each of them in turn.
+    /// Returns the field that was not used for longest. Where all were used in this step, it is the last one: if it
+    /// were the first, the next step would miss each of them in turn.
     fn victim(&self) -> usize {
         let oldest = (0..self.fields.len()).min_by_key(|&index| self.fields[index].used);
         oldest.filter(|&index| self.fields[index].used < self.now).unwrap_or(self.fields.len() - 1)

@@ -1,16 +1,16 @@
 //! Priority inheritance with backtracking: the next boxes of all agents at one step.
 //!
 //! An agent reserves the box that it likes best of those around it. Whoever stands there inherits its priority and has
-//! to find a box in turn, before anybody else; if it cannot, the agent tries its next box (Okumura et al. 2022, "Priority
-//! inheritance with backtracking for iterative multi-agent path finding", algorithm 1).
+//! to find a box in turn, before anybody else; if it cannot, the agent tries its next box (Okumura et al. 2022,
+//! "Priority inheritance with backtracking for iterative multi-agent path finding", algorithm 1).
 //!
 //! **Bodies of n x n boxes.** A body may have to push several others at once. Those pushed before the last one may not
 //! enter boxes of agents that wait for them, because these may still have to stay: so what was decided is never undone,
 //! and each agent is asked once per step. The last one may, as in the paper, where it closes a circle.
 //!
-//! **Headings.** Boxes are chosen as if agents had no heading; of boxes as near to the goal, one ahead is preferred. Then
-//! an agent that first has to turn holds its box and turns, and so do all that would enter a box that is held. What
-//! remains of the moves is free of conflicts, because it is a part of moves that are.
+//! **Headings.** Boxes are chosen as if agents had no heading; of boxes as near to the goal, one ahead is preferred.
+//! Then an agent that first has to turn holds its box and turns, and so do all that would enter a box that is held.
+//! What remains of the moves is free of conflicts, because it is a part of moves that are.
 //!
 //! The pushes are a stack of our own, because a chain of ten thousand agents in a corridor would exhaust a thread's.
 
@@ -104,7 +104,8 @@ impl Inheritance {
         }
     }
 
-    /// Begins a step: nobody has a box yet. The members are those that [`Inheritance::place`] adds then, in their order.
+    /// Begins a step: nobody has a box yet. The members are those that [`Inheritance::place`] adds then, in their
+    /// order.
     pub(crate) fn begin(&mut self) {
         self.cache.begin_step();
         self.members.clear();
@@ -116,8 +117,8 @@ impl Inheritance {
         self.is_broken = false;
     }
 
-    /// Places the next agent. Returns whether its body fits and overlaps no other that was placed before it; otherwise the
-    /// agent will wait, and nobody enters its boxes.
+    /// Places the next agent. Returns whether its body fits and overlaps no other that was placed before it; otherwise
+    /// the agent will wait, and nobody enters its boxes.
     pub(crate) fn place(&mut self, member: Member, position: (u32, u32)) -> bool {
         let agent = self.members.len();
         self.members.push(member);
@@ -309,8 +310,8 @@ impl Inheritance {
         direction.unwrap_or(4)
     }
 
-    /// Sorts the boxes that an agent can reach in one step: by their distance to the goal; of equal ones those that need
-    /// fewer turns, then free ones, then by lot.
+    /// Sorts the boxes that an agent can reach in one step: by their distance to the goal; of equal ones those that
+    /// need fewer turns, then free ones, then by lot.
     fn rank(&mut self, frame: &mut Frame, preference: Preference) {
         let agent = frame.agent as usize;
         let member = self.members[agent];
@@ -347,7 +348,8 @@ impl Inheritance {
         self.cache.directions(self.graphs.all(), key, at)
     }
 
-    /// Reserves the next candidate that is not taken, and lists those who have to leave it. Returns whether there is one.
+    /// Reserves the next candidate that is not taken, and lists those who have to leave it. Returns whether there is
+    /// one.
     fn propose(&mut self, top: usize) -> bool {
         let frame = self.frames[top];
         let agent = frame.agent as usize;
@@ -393,8 +395,8 @@ impl Inheritance {
         true
     }
 
-    /// Returns whether another agent of one box goes to the box of this one, so that they would swap. Larger bodies would
-    /// overlap.
+    /// Returns whether another agent of one box goes to the box of this one, so that they would swap. Larger bodies
+    /// would overlap.
     fn swaps(&self, agent: usize, now: u32, other: u32) -> bool {
         other != NONE
             && other != agent as u32

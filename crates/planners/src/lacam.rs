@@ -1,10 +1,11 @@
 //! LaCAM*: a first plan at once, better ones as long as it may search, the best one in the end.
 //!
-//! It searches in the space of the poses of all agents, depth first. The next poses are those of a PIBT step; each visit
-//! of the same poses adds a constraint, who has to go where, so that in the end all successors were generated (Okumura
-//! 2023, "LaCAM: search-based algorithm for quick multi-agent pathfinding", algorithm 1). After the first plan it goes on:
-//! a shorter way to known poses is handed on to all that follows them, and what cannot be better than the best plan is
-//! left out (Okumura 2023, "Improving LaCAM for scalable eventually optimal multi-agent pathfinding", algorithm 1).
+//! It searches in the space of the poses of all agents, depth first. The next poses are those of a PIBT step; each
+//! visit of the same poses adds a constraint, who has to go where, so that in the end all successors were generated
+//! (Okumura 2023, "LaCAM: search-based algorithm for quick multi-agent pathfinding", algorithm 1). After the first plan
+//! it goes on: a shorter way to known poses is handed on to all that follows them, and what cannot be better than the
+//! best plan is left out (Okumura 2023, "Improving LaCAM for scalable eventually optimal multi-agent pathfinding",
+//! algorithm 1).
 
 use crate::distances::GoalDistances;
 use crate::graph::NONE;
@@ -63,8 +64,8 @@ impl Default for LacamConfig {
 pub struct LacamOutcome {
     /// The best plan that was found, if any.
     pub plan: Option<Plan>,
-    /// Whether the search ended before its budget: then the plan is the best one there is, and without a plan the problem
-    /// has no solution.
+    /// Whether the search ended before its budget: then the plan is the best one there is, and without a plan the
+    /// problem has no solution.
     pub is_exhaustive: bool,
     /// The number of expansions.
     pub expansions: u64,

@@ -1,9 +1,9 @@
 //! PIBT: the next action of thousands of agents, cycle by cycle, also where goals never end.
 //!
 //! See [`Pibt`]. The source is Okumura, Machida, Défago and Tamura 2022, "Priority inheritance with backtracking for
-//! iterative multi-agent path finding" (algorithm 1), with the swap operation of Okumura 2023 ("Improving LaCAM for scalable
-//! eventually optimal multi-agent pathfinding"). Agents with headings first turn and hold their box meanwhile, as in the default planner of the League of
-//! Robot Runners (Chan et al. 2024).
+//! iterative multi-agent path finding" (algorithm 1), with the swap operation of Okumura 2023 ("Improving LaCAM for
+//! scalable eventually optimal multi-agent pathfinding"). Agents with headings first turn and hold their box meanwhile,
+//! as in the default planner of the League of Robot Runners (Chan et al. 2024).
 
 use crate::graph::{Graphs, NONE};
 use crate::inheritance::{Inheritance, Member};
@@ -20,8 +20,8 @@ const TIES: Purpose = Purpose(1);
 /// Draws that decide between agents of one age.
 const RANKS: Purpose = Purpose(2);
 
-/// Steps for which an agent with a heading keeps its lot among equal boxes. If each step had its own, an agent could turn
-/// to and fro; two half turns and two steps are time enough.
+/// Steps for which an agent with a heading keeps its lot among equal boxes. If each step had its own, an agent could
+/// turn to and fro; two half turns and two steps are time enough.
 const STEPS_PER_LOT: u64 = 8;
 
 /// Age at which agents first do without swaps: most swaps are over by then.
@@ -108,9 +108,9 @@ impl Pibt {
     /// outside the map or overlaps that of an agent with a lower number waits, and nobody enters its boxes
     /// ([`Pibt::misplaced_agents`]). An agent without a goal, or without a path to it, stays, but makes way.
     ///
-    /// Where all bodies have one box and each two neighboring boxes lie on a circle, as on floors without dead ends, each
-    /// agent comes to its goal in the end, however many there are: theorem 1 of the paper for the classical model, with
-    /// headings it is only tested.
+    /// Where all bodies have one box and each two neighboring boxes lie on a circle, as on floors without dead ends,
+    /// each agent comes to its goal in the end, however many there are: theorem 1 of the paper for the classical model,
+    /// with headings it is only tested.
     ///
     /// # Errors
     /// When there are not as many poses, goals and ages as agents, or a goal is not free for the agent's body.
@@ -216,8 +216,8 @@ fn may_swap(age: u32) -> bool {
     age < AGE_WITHOUT_SWAPS || (age / AGE_WITHOUT_SWAPS).ilog2() % 2 == 1
 }
 
-/// Plans step by step until all agents are at their goals at once. Returns none if they are not after so many steps: PIBT
-/// is fast, but not complete.
+/// Plans step by step until all agents are at their goals at once. Returns none if they are not after so many steps:
+/// PIBT is fast, but not complete.
 ///
 /// The model is that of the problem.
 pub fn plan(instance: &Instance, config: PibtConfig, max_steps: usize) -> Option<Plan> {

@@ -38,8 +38,8 @@ pub enum ActionModel {
     /// competition").
     #[default]
     Turns,
-    /// Four moves and wait, as in classical multi-agent path finding (Stern et al. 2019, "Multi-agent pathfinding: definitions, variants, and
-    /// benchmarks").
+    /// Four moves and wait, as in classical multi-agent path finding (Stern et al. 2019, "Multi-agent pathfinding:
+    /// definitions, variants, and benchmarks").
     Classical,
 }
 

@@ -1,8 +1,8 @@
 //! Prioritized planning: one agent after the other, each around those before it.
 //!
 //! Each takes the path that arrives earliest, by safe intervals (Silver 2005, "Cooperative pathfinding"; Phillips and
-//! Likhachev 2011, "SIPP"). It is fast and knows bodies of any size, but it is not complete: an agent that finds no path
-//! is put first, and all is planned again, until an order comes up a second time.
+//! Likhachev 2011, "SIPP"). It is fast and knows bodies of any size, but it is not complete: an agent that finds no
+//! path is put first, and all is planned again, until an order comes up a second time.
 
 use crate::distances::GoalDistances;
 use crate::instance::Instance;

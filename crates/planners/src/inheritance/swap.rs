@@ -1,9 +1,9 @@
 //! The swap operation: two agents who meet in a corridor go back to where they can pass each other.
 //!
-//! An agent that stands in the way of another, whose box it needs itself, goes away from its goal and draws the other one
-//! after it, until there is room for both (Okumura 2023, "Improving LaCAM for scalable eventually optimal multi-agent
-//! pathfinding", the swap operation of its configuration generator). It looks along the corridor only, and agents of one box only: whether larger bodies can
-//! pass each other is no matter of the number of neighbors.
+//! An agent that stands in the way of another, whose box it needs itself, goes away from its goal and draws the other
+//! one after it, until there is room for both (Okumura 2023, "Improving LaCAM for scalable eventually optimal
+//! multi-agent pathfinding", the swap operation of its configuration generator). It looks along the corridor only, and
+//! agents of one box only: whether larger bodies can pass each other is no matter of the number of neighbors.
 
 use super::{Inheritance, Status};
 use crate::graph::NONE;

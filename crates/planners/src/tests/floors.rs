@@ -41,8 +41,8 @@ impl Problem {
     }
 }
 
-/// Returns random problems on floors of at most `side` x `side` boxes with agents of 1 to `max_size` boxes; as many of them
-/// as fit, and at most `max_agents`.
+/// Returns random problems on floors of at most `side` x `side` boxes with agents of 1 to `max_size` boxes; as many of
+/// them as fit, and at most `max_agents`.
 pub(super) fn problems(
     side: u32,
     max_size: u32,
