@@ -26,12 +26,17 @@ struct Fleet {
 }
 
 impl Fleet {
-    fn new(free: &FreeSpace, agents: usize) -> Self {
+    /// Creates agents of so many boxes at the first places that are apart.
+    fn new(free: &FreeSpace, agents: usize, size: u32) -> Self {
+        let free = free.anchors(size);
         let boxes = (0..SIDE).flat_map(|row| (0..SIDE).map(move |col| (col, row)));
         let places: Vec<_> = boxes.filter(|&(col, row)| free.is_free(col, row)).collect();
-        let stride = places.len() / agents;
-        let start = |agent: usize| places[agent * stride];
-        let poses = (0..agents).map(start).map(|(col, row)| GridPose::new(col, row, 0)).collect();
+        let starts =
+            places.iter().filter(|(col, row)| col.is_multiple_of(size) && row.is_multiple_of(size));
+        let starts: Vec<_> = starts.collect();
+        let stride = starts.len() / agents;
+        let start = |agent: usize| starts[agent * stride];
+        let poses = (0..agents).map(start).map(|&(col, row)| GridPose::new(col, row, 0)).collect();
         let streams = Streams::new(Seed(1));
         let mut fleet = Self { poses, goals: Vec::new(), streams, draws: 0, places };
         fleet.goals = (0..agents).map(|_| Some(fleet.next_goal())).collect();
@@ -57,20 +62,21 @@ impl Fleet {
     }
 }
 
-/// Pillars in every third row and column, a part of which is left out.
-fn floor() -> FreeSpace {
+/// Pillars in rows and columns at a distance, a part of which is left out.
+fn floor(distance: u32) -> FreeSpace {
     let streams = Streams::new(Seed(2));
     FreeSpace::new(SIDE, SIDE, |col, row| {
         let is_pillar = streams.block(col, u64::from(row), WALLS, 0)[0] % 10 < 9;
-        !(col % 3 == 1 && row % 3 == 1 && is_pillar)
+        !(col % distance == 1 && row % distance == 1 && is_pillar)
     })
 }
 
-fn measure(agents: usize, model: ActionModel) {
-    let free = floor();
-    let mut fleet = Fleet::new(&free, agents);
+fn measure(agents: usize, size: u32, model: ActionModel) {
+    // There is room for two bodies beside each other between pillars.
+    let free = floor(2 * size + 1);
+    let mut fleet = Fleet::new(&free, agents, size);
     let config = PibtConfig { model, ..PibtConfig::default() };
-    let mut pibt = Pibt::new(&free, &vec![1; agents], config).expect("sizes are 1");
+    let mut pibt = Pibt::new(&free, &vec![size; agents], config).expect("sizes are positive");
     let mut state = PibtState::new(agents);
     let mut advance = |fleet: &mut Fleet| {
         let actions = pibt.step(&mut state, &fleet.poses, &fleet.goals).expect("goals are free");
@@ -87,7 +93,7 @@ fn measure(agents: usize, model: ActionModel) {
     let arrivals: usize = (0..steps).map(|_| advance(&mut fleet)).sum();
     let step_s = started.elapsed().as_secs_f64() / f64::from(steps);
     println!(
-        "{agents:>6} agents, {model:?}: first step {:.0} ms, then {:.2} ms ({:.0} steps/s), {:.1} goals per step",
+        "{agents:>6} agents of {size} x {size} boxes, {model:?}: first step {:.0} ms, then {:.2} ms ({:.0} steps/s), {:.1} goals per step",
         1e3 * first_s,
         1e3 * step_s,
         1.0 / step_s,
@@ -130,8 +136,11 @@ fn main() {
         measure_lacam(agents, ActionModel::Turns);
         measure_lacam(agents, ActionModel::Classical);
     }
+    for agents in [100, 500] {
+        measure(agents, 3, ActionModel::Turns);
+    }
     for agents in [1000, 10_000] {
-        measure(agents, ActionModel::Turns);
-        measure(agents, ActionModel::Classical);
+        measure(agents, 1, ActionModel::Turns);
+        measure(agents, 1, ActionModel::Classical);
     }
 }
