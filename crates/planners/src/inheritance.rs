@@ -6,7 +6,9 @@
 //!
 //! **Bodies of n x n boxes.** A body may have to push several others at once. Those pushed before the last one may not
 //! enter boxes of agents that wait for them, because these may still have to stay: so what was decided is never undone,
-//! and each agent is asked once per step. The last one may, as in the paper, where it closes a circle.
+//! and each agent is asked once per step. The last one may, as in the paper, where it closes a circle. A body that
+//! cannot leave the way in one step, because it is pushed to a side where it needs several, begins to, while the other
+//! one waits.
 //!
 //! **Headings.** Boxes are chosen as if agents had no heading; of boxes as near to the goal, one ahead is preferred.
 //! Then an agent that first has to turn holds its box and turns, and so do all that would enter a box that is held.
@@ -58,6 +60,8 @@ struct Frame {
     pending: usize,
     /// Boxes of open agents at a lower depth are forbidden.
     barrier: u32,
+    /// Whether it only begins to make way, and the one that pushes it no longer waits for that.
+    is_sidestep: bool,
 }
 
 /// One step of all agents. The buffers mean nothing between steps.
@@ -254,8 +258,12 @@ impl Inheritance {
     fn advance(&mut self, top: usize) -> Option<bool> {
         let agent = self.frames[top].agent as usize;
         if self.next[agent] == NONE && !self.propose(top) {
+            if !self.frames[top].is_sidestep && self.sidestep(top) {
+                return None;
+            }
+            let is_sidestep = self.frames[top].is_sidestep;
             self.close_in_place(top);
-            return Some(false);
+            return Some(is_sidestep);
         }
         while self.frames[top].pending < self.pushed.len() {
             let other = self.pushed[self.frames[top].pending];
@@ -278,6 +286,54 @@ impl Inheritance {
         Some(true)
     }
 
+    /// Lets an agent that cannot leave the way of a large body in one step, or being one, begin to: the pusher gives up
+    /// its candidate, and the agent tries the boxes where less of it is in the way. Returns false for agents of one
+    /// box.
+    fn sidestep(&mut self, top: usize) -> bool {
+        let Some(below) = top.checked_sub(1) else { return false };
+        let frame = self.frames[top];
+        let agent = frame.agent as usize;
+        let pusher = self.frames[below].agent as usize;
+        // Of two agents of one box, each is either in the way or not.
+        if self.graphs.of(agent).size() == 1 && self.graphs.of(pusher).size() == 1 {
+            return false;
+        }
+        let wanted = self.next[pusher];
+        let now = self.members[agent].now;
+        let in_the_way = |at: u32| {
+            let mut others = self.graphs.of(pusher).body(wanted);
+            let body: Vec<usize> = self.graphs.of(agent).body(at).collect();
+            others.by_ref().filter(|covered| body.contains(covered)).count()
+        };
+        let present = in_the_way(now);
+        let mut candidates = [NONE; 5];
+        let mut len = 0;
+        for &to in &frame.candidates[..usize::from(frame.len)] {
+            if in_the_way(to) < present {
+                candidates[len] = to;
+                len += 1;
+            }
+        }
+        self.withdraw(below);
+        let first = self.pushed.len();
+        let frame = &mut self.frames[top];
+        *frame = Frame {
+            candidates,
+            len: len as u8,
+            cursor: 0,
+            partner: NONE,
+            first,
+            pending: first,
+            // The pusher may have to stay.
+            barrier: top as u32,
+            is_sidestep: true,
+            ..*frame
+        };
+        let direction = self.graphs.of(agent).direction(now, candidates[0]);
+        self.wishes[agent] = direction.unwrap_or(4);
+        true
+    }
+
     fn open(&mut self, agent: u32, barrier: u32) {
         let mut frame = Frame {
             agent,
@@ -288,6 +344,7 @@ impl Inheritance {
             first: self.pushed.len(),
             pending: self.pushed.len(),
             barrier,
+            is_sidestep: false,
         };
         self.rank(&mut frame, Preference::Near);
         self.wishes[agent as usize] = self.first_direction(&frame);

@@ -1,6 +1,6 @@
 use super::floors::{Problem, agent, check_step, draw, problems, small_agents};
 use crate::pibt::plan;
-use crate::{Action, ActionModel, GridPose, Pibt, PibtConfig, PibtState, Seed};
+use crate::{Action, ActionModel, GridPose, Instance, Pibt, PibtConfig, PibtState, Seed};
 use proptest::prelude::*;
 
 const MODELS: [ActionModel; 2] = [ActionModel::Turns, ActionModel::Classical];
@@ -146,6 +146,19 @@ fn two_agents_swap_in_a_corridor_with_a_pocket() {
         let instance = small_agents(art, model, &ends);
         let plan = plan(&instance, config(model, 1), 100).expect("all arrive");
         assert_eq!(plan.validate(&instance), Ok(()));
+    }
+}
+
+#[test]
+fn large_bodies_make_way_for_each_other_to_the_side() {
+    for model in MODELS {
+        for sizes in [[2, 2], [1, 3], [3, 1]] {
+            let free = draw("........\n........\n........\n........\n........\n........");
+            let agents = vec![agent(sizes[0], (0, 2), (5, 2)), agent(sizes[1], (5, 2), (0, 2))];
+            let instance = Instance::new(&free, model, agents).unwrap();
+            let plan = plan(&instance, config(model, 1), 100).expect("all arrive");
+            assert_eq!(plan.validate(&instance), Ok(()));
+        }
     }
 }
 
