@@ -1,6 +1,6 @@
 //! Speed of the robots world: robot-cycles per CPU second, speed-up, and related numbers.
 //!
-//! `cargo bench -p sidestep [-- PART ...]` with the parts `rates`, `teams`, `corridor`, `loop`,
+//! `cargo bench -p sidestep [-- PART ...]` with the parts `shipped`, `rates`, `teams`, `corridor`, `loop`,
 //! `recording` and `looking`; every number is a ratio or a rate taken in one run, because the machine may be
 //! noisy. Sensors and effectors are both unreliable.
 
@@ -128,6 +128,55 @@ fn speed_up(source: &Source, workers: usize, cycles: u64) -> f64 {
         time(simulation, cycles / 4);
     }
     median_of(9, || time(&mut alone, cycles).1 / time(&mut team, cycles).1)
+}
+
+/// Shipped scenarios of the world.
+const SHIPPED: [&str; 6] = ["office", "corridor", "crossing", "default", "radio", "one-robot"];
+
+/// Prints what people run: each shipped scenario as it is, and the main two with each other behavior of their couriers.
+fn shipped() {
+    println!(
+        "shipped scenarios, one worker: robot-cycles per CPU second, trips in 1000 robot-cycles"
+    );
+    for name in SHIPPED {
+        print_shipped(name, "as it is", &shipped_scenario(name, str::to_owned));
+    }
+    for name in ["office", "corridor"] {
+        for avoidance in ["avoid", "filter", "touch"] {
+            let with_avoidance = |line: &str| {
+                let keys = line.trim_end_matches([' ', '}']);
+                format!("{keys}, avoidance = \"{avoidance}\" }}")
+            };
+            print_shipped(name, avoidance, &shipped_scenario(name, with_avoidance));
+        }
+        let wander = |_: &str| "behaviour = { kind = \"wander\" }".to_owned();
+        print_shipped(name, "wander", &shipped_scenario(name, wander));
+    }
+}
+
+/// Returns a shipped scenario with the behavior of each shuttle edited.
+fn shipped_scenario(name: &str, edit: impl Fn(&str) -> String) -> Source {
+    let path = format!("{}/../../scenarios/robots/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).expect("a shipped scenario");
+    let is_shuttle = |line: &str| line.starts_with("behaviour = { kind = \"shuttle\"");
+    let lines =
+        text.lines().map(|line| if is_shuttle(line) { edit(line) } else { line.to_owned() });
+    let text = lines.collect::<Vec<_>>().join("\n");
+    Source::new(path, text, "")
+}
+
+fn print_shipped(name: &str, what: &str, source: &Source) {
+    const CYCLES: u64 = 4_000;
+    let mut run = robots_run(source, 1).expect("a valid scenario");
+    let robot_cycles = CYCLES as f64 * run.world().robots().len() as f64;
+    // The best of several stretches: the speed of the machine when nothing disturbs it.
+    let best = (0..3).map(|_| time(&mut run, CYCLES).0).fold(f64::INFINITY, f64::min);
+    let total = run.metrics().total;
+    println!(
+        "  {name:<10} {what:<9} {:>6.2} M  {:>6.2} trips",
+        robot_cycles / best / 1e6,
+        1000.0 * total.trips as f64 / (3.0 * robot_cycles),
+    );
 }
 
 fn rates() {
@@ -318,7 +367,8 @@ fn size_of_folder(folder: &std::path::Path) -> u64 {
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let parts: [(&str, fn()); 6] = [
+    let parts: [(&str, fn()); 7] = [
+        ("shipped", shipped),
         ("rates", rates),
         ("teams", teams),
         ("corridor", corridor),

@@ -1,6 +1,7 @@
 //! Number of steps to the nearest goal, by breadth-first search.
 
-use super::{FreeSpace, Lanes, OFF_LANE_COST, STEPS};
+use super::lanes::{Lanes, OFF_LANE_COST};
+use super::{FreeSpace, STEPS};
 
 /// The number of 4-connected steps from every box of a grid to the nearest goal.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,11 +1,8 @@
 //! The direction to the nearest goal from every box, and how much farther each neighbor is.
 
-use super::{Distances, FreeSpace, Lanes, STEPS};
+use super::lanes::{Lanes, OFF_LANE_COST};
+use super::{Distances, FreeSpace, STEPS};
 use std::sync::Arc;
-
-/// Extra price of a step onto a place that is off lane (see [`Lanes`]) and no goal, in steps: a path changes to its
-/// lane unless its goal is very near.
-pub const OFF_LANE_COST: u8 = 2;
 
 /// The first step of a cheapest 4-connected path to the nearest goal, and the difference in cost to each neighbor, for
 /// every box of a grid.

@@ -5,6 +5,10 @@ use super::{FreeSpace, STEPS};
 /// Widest passage with lanes, in boxes. A wider one is a hall: bodies meet there rarely, and a lane would lead far around.
 const MAX_PASSAGE_BOXES: u32 = 16;
 
+/// Extra price of a step onto a place that is off lane and no goal, in steps: a path changes to its
+/// lane unless its goal is very near.
+pub const OFF_LANE_COST: u8 = 2;
+
 /// The directions in which a body at each anchor is off the right half of its passage.
 ///
 /// Who keeps to the right half of every passage in which two bodies fit side by side never meets another one head on

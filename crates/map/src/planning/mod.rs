@@ -12,9 +12,9 @@ mod lanes;
 mod octile;
 
 pub use distance::Distances;
-pub use flow_field::{FlowField, FlowWindow, OFF_LANE_COST};
+pub use flow_field::{FlowField, FlowWindow};
 pub use free_space::{FREE_WINDOW_COLUMNS, FreeSpace, FreeWindow};
-pub use lanes::Lanes;
+pub use lanes::{Lanes, OFF_LANE_COST};
 pub use octile::octile_distance;
 
 /// The four steps on a grid as (columns, rows), by direction: 0 east, 1 north, 2 west, 3 south.

@@ -2,16 +2,19 @@
 //!
 //! Every robot decides alone, from its percept, its memory, the static map and the flow field of its goal:
 //!
-//! 1. *Local costmap*: readings that the static map does not explain block places around the robot; so does
+//! 1. *Lanes*: the flow field leads along the right half of passages in which two bodies fit side by side
+//!    ([`Lanes`](sidestep_map::planning::Lanes)). Where the next step is clear the robot takes it.
+//! 2. *Local costmap*: readings that the static map does not explain block places around the robot; so does
 //!    the last contact, for a few decisions.
-//! 2. *Detour*: the cheapest path through the places around it. A blocked place costs some actions
-//!    that grow while the robot waits, because the obstacle may go away.
-//! 3. *Requests*: a robot that waits before something asks it to make room ([`PassRequest`]). A robot
+//! 3. *Detour*: the cheapest path through the places around it. A blocked place costs some actions
+//!    that grow while the robot waits, because the obstacle may go away; a place off lane costs more while it is
+//!    patient, and little when it goes around something that stays.
+//! 4. *Requests*: a robot that waits before something asks it to make room ([`PassRequest`]). A robot
 //!    obeys a rank above its own: it takes a free place that it was not asked for, or passes the
 //!    request on with the same rank (priority inheritance, as in PIBT: Okumura et al., "Priority
 //!    inheritance with backtracking for iterative multi-agent path finding", 2022). Ranks are drawn;
 //!    a robot that stands at its last goal has none and obeys every other, then returns.
-//! 4. *Deadlock*: after many actions without progress a robot draws a new rank and strays for some
+//! 5. *Deadlock*: after many actions without progress a robot draws a new rank and strays for some
 //!    actions. Without this, two robots in a dead end could wait for each other forever.
 
 mod detour;
