@@ -57,6 +57,8 @@ const WAIT_TIMEOUT_DECISIONS: u8 = 5;
 const MAX_YIELD_DECISIONS: u8 = 4;
 /// Decisions for which a robot waits before something in the hope that it goes on; then it goes around.
 const PATIENT_DECISIONS: u8 = 4;
+/// The same where sensors or wheels err: queues are slower there, and who leaves one does not find back into it.
+const CAREFUL_PATIENT_DECISIONS: u8 = MAX_WAITED;
 /// Price of a blocked place for a robot that has no patience left: above that of a long detour.
 const IMPATIENT_BLOCKED_COST: u16 = 31;
 /// Extra price of a place that is off lane, because who overtakes a queue meets those that come.
@@ -410,7 +412,7 @@ fn travel(
     let Some(direction) = direction else { return STAY };
     if !memory.is_on_detour()
         && view.field.lanes().is_some()
-        && memory.waited >= PATIENT_DECISIONS
+        && memory.waited >= patient_decisions(view)
         && !view.descends(direction)
     {
         memory.waited = MAX_WAITED;
@@ -446,7 +448,7 @@ fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
         moved.is_some_and(|moved| view.rise((moved + 2) % 4).is_some_and(|rise| rise > 0));
     // Where nothing errs robots see enough to keep to every change of course.
     let is_sidestep = !view.is_careful || moved.is_some() && !has_gained;
-    let is_patient = memory.waited < PATIENT_DECISIONS;
+    let is_patient = memory.waited < patient_decisions(view);
     let off_lane = if is_patient { OFF_LANE_COST } else { 1 };
     let blocked = if view.field.lanes().is_none() {
         // At first cheaper than most detours, because the obstacle may go away; each decision in vain
@@ -466,6 +468,10 @@ fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
         moved,
         is_sidestep,
     }
+}
+
+fn patient_decisions(view: &LocalView<'_>) -> u8 {
+    if view.is_careful { CAREFUL_PATIENT_DECISIONS } else { PATIENT_DECISIONS }
 }
 
 /// Returns whether to let another robot pass that may step into the same place: one from the
