@@ -32,7 +32,6 @@ mod pictures;
 mod readers;
 mod report;
 mod reproduce;
-mod series;
 mod slurm;
 mod stops;
 mod studio;
