@@ -28,8 +28,8 @@ pub(super) struct GroupMoves {
     /// By turn: the order of the members' draws.
     moves: Vec<Move>,
     graph: DependencyGraph,
-    /// The boxes that the bodies of a ring want, sorted.
-    wanted: Vec<WantedBox>,
+    /// The boxes that the bodies of a ring would enter, sorted.
+    entries: Vec<BoxEntry>,
     /// Boxes of the floor that were entered.
     entered: Vec<usize>,
 }
@@ -46,7 +46,7 @@ pub(super) struct Move {
 
 /// A box that a body of a ring enters with a step of its walk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct WantedBox {
+struct BoxEntry {
     index: usize,
     turn: u32,
     step: usize,
@@ -237,7 +237,7 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
 
     /// Moves bodies that wait for each other.
     fn move_together(&self, ring: &[u32], group: &mut GroupMoves, scratch: &mut Scratch) {
-        self.collect_wanted(ring, group);
+        self.collect_entries(ring, group);
         while self.cut_walks(ring, group) {}
         let moves = |group: &GroupMoves, turn: u32| {
             let one = &group.moves[turn as usize];
@@ -257,18 +257,18 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
         result.contact.is_none() || result.steps > 0 && self.keeps_steps(slot)
     }
 
-    fn collect_wanted(&self, ring: &[u32], group: &mut GroupMoves) {
-        group.wanted.clear();
+    fn collect_entries(&self, ring: &[u32], group: &mut GroupMoves) {
+        group.entries.clear();
         for &turn in ring {
             let one = &group.moves[turn as usize];
             let Some(walk) = self.walk_of(one) else { continue };
             let base = self.base(self.body(one.slot));
             for (step, all) in walk.steps.iter().enumerate() {
                 let boxes = all.enter.iter().map(|&offset| box_index(base, offset));
-                group.wanted.extend(boxes.map(|index| WantedBox { index, turn, step }));
+                group.entries.extend(boxes.map(|index| BoxEntry { index, turn, step }));
             }
         }
-        group.wanted.sort_unstable();
+        group.entries.sort_unstable();
     }
 
     /// Cuts the walks of a ring that meet something, as they are now, and returns whether there was one.
@@ -324,8 +324,8 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
                 return Some(word);
             }
         }
-        let first = group.wanted.partition_point(|wanted| wanted.index < index);
-        let here = group.wanted[first..].iter().take_while(|wanted| wanted.index == index);
+        let first = group.entries.partition_point(|entry| entry.index < index);
+        let here = group.entries[first..].iter().take_while(|entry| entry.index == index);
         // Those of one box are in the order of their draws.
         let mut wanting = here.filter(|w| w.step < group.moves[w.turn as usize].result.steps);
         let winner = wanting.next().filter(|winner| winner.turn < turn)?;

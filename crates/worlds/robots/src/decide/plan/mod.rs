@@ -119,8 +119,8 @@ impl Planner {
         let heard = PassRequest::take_heard(words);
         let mut memory = PlannerMemory::from_memory(words);
         update_memory(&mut memory, goal, percept, draws);
-        let is_free = heard.is_none() && !memory.is_occupied() && !goal.is_final_place(percept.at);
-        if let Some(direction) = self.clear_direction(goal, percept).filter(|_| is_free) {
+        let is_free = heard.is_none() && !memory.is_occupied();
+        if let Some(direction) = is_free.then(|| self.clear_direction(goal, percept)).flatten() {
             let then = next_direction(goal.field, percept.at, direction);
             memory.set_request(memory.rank, direction, then);
             memory.store(words);
@@ -470,6 +470,7 @@ fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
     }
 }
 
+/// Returns the decisions for which a robot waits before something; then it goes around.
 fn patient_decisions(view: &LocalView<'_>) -> u8 {
     if view.is_careful { CAREFUL_PATIENT_DECISIONS } else { PATIENT_DECISIONS }
 }
