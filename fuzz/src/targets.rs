@@ -6,8 +6,8 @@ use sidestep::experiment::sweep::Sweep;
 use sidestep::import::table::CsvTable;
 use sidestep::import::urdf::{Model, srdf::Semantics};
 use sidestep::import::{
-    ForeignFormat, ascii, bag, bluesky, carmen, image::Bitmap, mesh, movingai, mrclam, rosmap,
-    stage, traffic,
+    ForeignFormat, ascii, bag, bluesky, carmen, image::Bitmap, lorr, mesh, movingai, mrclam,
+    rosmap, stage, traffic,
 };
 use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
@@ -31,6 +31,8 @@ pub(crate) const TARGETS: &[Target] = &[
     ("ascii_map", |data| text(data, |t| drop(ascii::parse("f", t, 0.25)))),
     ("movingai_map", |data| text(data, |t| drop(movingai::parse_map("f", t, 0.25)))),
     ("movingai_scen", |data| text(data, |t| drop(movingai::parse_scen("f", t)))),
+    ("lorr_problem", |data| text(data, |t| drop(lorr::parse_settings("f", t)))),
+    ("lorr_lists", |data| text(data, robot_runners_lists)),
     ("ros_map", |data| drop(rosmap::load(&beside_an_image(data)))),
     ("image", |data| drop(Bitmap::decode("f", data.to_vec()))),
     ("stage", |data| drop(stage::load(&file("f.world", data)))),
@@ -180,4 +182,12 @@ fn learned(text: &str) {
 fn tabled(data: &[u8]) {
     file("f.parquet", data);
     drop(read_table(folder(), "f", ..));
+}
+
+/// Reads a text as a list of starts and as one of tasks.
+fn robot_runners_lists(text: &str) {
+    let map = "type octile\nheight 2\nwidth 3\nmap\n...\n@@.\n";
+    let map = movingai::parse_map("f", map, 1.0).expect("a map").map;
+    drop(lorr::parse_starts("f", text, &map));
+    drop(lorr::parse_tasks("f", text, &map, &[(0, 1)]));
 }

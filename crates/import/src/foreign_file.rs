@@ -8,7 +8,7 @@ use super::mesh::Mesh;
 use super::report::{ImportReport, ItemCount, Treatment};
 use super::table::{CsvTable, data_lines};
 use super::traffic::begins_as_traffic;
-use super::{bag, carmen, mesh, movingai, mrclam, rosmap, stage};
+use super::{bag, carmen, lorr, mesh, movingai, mrclam, rosmap, stage};
 use crate::urdf::Model;
 use crate::urdf::srdf::Semantics;
 use crate::{GridOptions, ImportedMap, import_map};
@@ -33,6 +33,8 @@ pub enum ForeignFormat {
     CharMap,
     /// Starts and goals of MovingAI.
     Scen,
+    /// A problem of the League of Robot Runners.
+    RobotRunners,
     /// A robot model.
     Urdf,
     /// Groups and postures of a robot model.
@@ -107,10 +109,14 @@ impl ForeignFormat {
             return Ok(Some(Self::Bag));
         }
         let text = String::from_utf8_lossy(&start);
-        if is_of_robot_runners(&text) {
-            let cause = "is a problem of the League of Robot Runners, or a part of one, of which only the map is read";
-            let remedy = "give the .map file that its `mapFile` names, in the folder `maps`";
+        if text.starts_with(ROBOT_RUNNERS_LIST) {
+            let cause =
+                "is a list of a problem of the League of Robot Runners, which is read as a whole";
+            let remedy = "give the JSON file that names it as its `agentFile` or `taskFile`";
             return Err(InputError::new(path.display(), cause, remedy));
+        }
+        if ROBOT_RUNNERS_KEYS.iter().all(|key| text.contains(key)) {
+            return Ok(Some(Self::RobotRunners));
         }
         if is_mrclam_part(path, &text) {
             return Err(mrclam_part_error(path));
@@ -152,6 +158,7 @@ impl ForeignFormat {
             Self::Image => inspect_image(path),
             Self::CharMap => inspect_char_map(path),
             Self::Scen => movingai::load_scen(path).map(|file| file.report),
+            Self::RobotRunners => lorr::load(path).map(|problem| problem.report),
             Self::Urdf => inspect_urdf(path),
             Self::Srdf => inspect_srdf(path),
             Self::Stage => stage::load(path).map(|world| world.report),
@@ -173,6 +180,10 @@ const IMAGE_MAGICS: [&[u8]; 7] =
     [b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"II*\0", b"MM\0*", b"RIFF", b"BM"];
 /// The key of `metadata.yaml` by which it differs from the YAML file of a map.
 const BAG_METADATA_KEY: &str = "rosbag2_bagfile_information";
+/// Keys by which a problem of the League of Robot Runners is recognized.
+const ROBOT_RUNNERS_KEYS: [&str; 2] = ["\"mapFile\"", "\"agentFile\""];
+/// How the lists of such a problem begin.
+const ROBOT_RUNNERS_LIST: &str = "# version for LoRR";
 /// Messages with which logs of CARMEN begin, after comments.
 const CARMEN_MESSAGES: [&str; 8] =
     ["PARAM", "SYNC", "NEFF", "ODOM", "FLASER", "RLASER", "ROBOTLASER1", "TRUEPOS"];
@@ -183,12 +194,6 @@ const CHARACTER_BOXES: GridOptions =
 fn is_image_content(start: &[u8]) -> bool {
     // Any text may begin with two letters; an image has zeros.
     start.contains(&0) && IMAGE_MAGICS.iter().any(|magic| start.starts_with(magic))
-}
-
-/// Returns whether a text is a problem of the League of Robot Runners, or its list of agents or tasks.
-fn is_of_robot_runners(text: &str) -> bool {
-    const KEYS: [&str; 2] = ["\"mapFile\"", "\"agentFile\""];
-    text.starts_with("# version for LoRR") || KEYS.iter().all(|key| text.contains(key))
 }
 
 /// Returns whether a text has a line that begins as a message of CARMEN.
@@ -417,14 +422,13 @@ mod tests {
     }
 
     #[test]
-    fn a_problem_of_the_robot_runners_names_what_is_read_of_it() {
-        let problem = b"{ \"mapFile\": \"maps/a.map\", \"agentFile\": \"agents/a.agents\" }";
-        for (name, bytes) in
-            [("a.json", &problem[..]), ("a.tasks", b"# version for LoRR 2026\n3\n")]
-        {
-            let error = inspected(name, &[(name, bytes)]).expect_err(name);
-            assert!(error.cause().contains("League of Robot Runners"), "{error}");
-        }
+    fn a_problem_of_the_robot_runners_is_read_and_its_lists_name_it() {
+        let problem = b"{ \"mapFile\": \"m.map\", \"agentFile\": \"a.agents\" }";
+        let error = inspected("a.json", &[("a.json", problem)]).expect_err("no tasks");
+        assert!(error.cause().contains("lacks the key taskFile"), "{error}");
+        let list = b"# version for LoRR 2026\n3\n";
+        let error = inspected("a.tasks", &[("a.tasks", list)]).expect_err("a part");
+        assert!(error.remedy().contains("the JSON file that names it"), "{error}");
     }
 
     #[test]

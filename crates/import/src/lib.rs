@@ -16,6 +16,7 @@ mod foreign_file;
 pub mod image;
 mod imported_map;
 pub mod local_plane;
+pub mod lorr;
 mod map_file;
 mod map_yaml;
 pub mod mesh;
