@@ -45,6 +45,11 @@ impl AnchorGraph {
         self.codes.len()
     }
 
+    /// Returns the number of columns and rows.
+    pub(crate) fn extent(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// Returns the number of a box of the grid; none outside of it.
     pub(crate) fn index(&self, (col, row): (u32, u32)) -> Option<u32> {
         (col < self.width && row < self.height).then(|| row * self.width + col)

@@ -6,15 +6,18 @@ pub mod cbs;
 pub mod dependency_graph;
 mod descent;
 mod distances;
+mod goal_fields;
 mod graph;
 mod inheritance;
 mod instance;
 pub mod lacam;
+pub mod lifelong;
 pub mod pibt;
 mod plan;
 mod pose;
 pub mod prioritized;
 mod safe_intervals;
+pub mod tasks;
 #[cfg(test)]
 mod tests;
 
