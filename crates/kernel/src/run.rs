@@ -353,8 +353,9 @@ where
             }
             let segment_done = self.run_segment(segment);
             done += segment_done;
-            // The run is over, or its rows must be recorded.
-            if segment_done < segment {
+            // Rows must be recorded, or the run is over: where a segment ends with the cycle that ends the run, its length
+            // does not say so.
+            if segment_done < segment || self.world.is_over(&self.state) {
                 break;
             }
         }

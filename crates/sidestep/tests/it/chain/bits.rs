@@ -1,6 +1,7 @@
 //! The same bits however a run is made, and on every machine.
 
 use super::*;
+use sidestep::kernel::control::ControlLog;
 
 #[test]
 fn chains_that_meet_have_the_same_bits_however_they_are_run() {
@@ -37,6 +38,22 @@ fn a_snake_in_space_has_the_same_bits_however_it_is_run() {
 fn broken_chains_and_changes_have_the_same_bits_however_they_are_run() {
     assert_d1::<2>(BROKEN, 120, &[9, 10, 11, 19, 20, 21, 40, 80]);
     assert_d1::<2>(REPORTING, 400, &[0, 39, 40, 41, 60, 61, 200]);
+}
+
+/// Something is to be replayed before the cycle after the last, so that cycles are counted up to the end and no further.
+#[test]
+fn a_run_that_is_over_where_a_replay_is_due_ends_there() {
+    for text in [BROKEN, PLANNED] {
+        let mut alone = run::<2>(&source(3, text), 1);
+        alone.advance(1000);
+        assert!(alone.is_over() && alone.cycle() < 1000, "{text}");
+        let mut replayed = run::<2>(&source(3, text), 1);
+        let mut controls = ControlLog::default();
+        controls.add(alone.cycle(), []);
+        replayed.replay_controls(controls);
+        assert_eq!(replayed.advance(1000), alone.cycle(), "{text}");
+        assert_eq!(replayed.digest(), alone.digest(), "{text}");
+    }
 }
 
 #[test]
