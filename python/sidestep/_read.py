@@ -61,7 +61,7 @@ def read(folder: str | os.PathLike[str], tables: Sequence[str] | None = None) ->
     30
     >>> tables = sidestep.read(folder)
     >>> sorted(tables), len(tables["trajectories"])
-    (['events', 'trajectories'], 60)
+    (['events', 'series', 'trajectories'], 60)
     """
     known = table_names(folder)
     unknown = [name for name in tables or () if name not in known]

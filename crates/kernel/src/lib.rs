@@ -16,6 +16,7 @@
 //! - [`digest`], [`checkpoint`]: a state has one digest, and continues bit for bit.
 //! - [`control`]: the observations of agents, and external orders, checked and recorded.
 //! - [`batch`]: many simulations of one scenario at once, the same bits for every number of workers.
+//! - [`series`]: the metrics over time, which depend on the cycle alone.
 //! - [`interrupt`]: a cycle that takes long can be abandoned.
 //! - [`view`]: the scenery and the frames of any world; reading them changes no run.
 //! - [`math`], [`distr`], [`geometry`], [`geodesy`]: numbers that are the same on every platform.
@@ -41,6 +42,7 @@ pub mod network;
 pub mod ports;
 pub mod run;
 pub mod run_config;
+pub mod series;
 pub mod shell;
 pub mod simulation;
 pub mod space;

@@ -11,6 +11,7 @@ use crate::engine::{CycleRange, Engine};
 use crate::interrupt::Interrupt;
 use crate::ports::{RecordError, Recorder, SystemClock, TableBuffer, TableRowsBuffer, TableSchema};
 use crate::run_config::{GroupSizeHistogram, RunConfig, RunStats};
+use crate::series::MetricSeries;
 use crate::simulation::Simulation;
 use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId};
@@ -60,6 +61,8 @@ pub struct Run<W: World> {
     order_rows: TableRowsBuffer<OrderRow>,
     /// Controls that were submitted and wait to be recorded.
     control_rows: TableRowsBuffer<ControlRow>,
+    /// Metrics over time that wait to be recorded.
+    series: MetricSeries,
 }
 
 impl<W: ControllableWorld> Run<W> {
@@ -86,6 +89,7 @@ impl<W: ControllableWorld> Run<W> {
             last_applied: None,
             order_rows: TableRowsBuffer::default(),
             control_rows: TableRowsBuffer::default(),
+            series: MetricSeries::default(),
         }
     }
 }
@@ -148,8 +152,9 @@ impl<W: World> Run<W> {
     /// Number of cycles that may run before rows must be recorded.
     fn cycles_until_flush(&self) -> u64 {
         let cycles = self.world.cycles_until_flush(&self.state, &self.collector, self.cycle);
-        if self.order_rows.is_full() || self.control_rows.is_full() {
-            // Not 0: orders are given between cycles, so a cycle adds none, and `advance` promises to do at least one.
+        if self.order_rows.is_full() || self.control_rows.is_full() || self.series.is_full() {
+            // Not 0: a cycle adds no orders, which are given between cycles, and one row of metrics at most, and `advance`
+            // promises to do at least one.
             cycles.min(1)
         } else {
             cycles
@@ -176,6 +181,11 @@ impl<W: World> Run<W> {
     fn next_replay_cycle(&self) -> Option<Cycle> {
         let orders = self.order_log.next_after(self.cycle);
         orders.into_iter().chain(self.control_log.next_after(self.cycle)).min()
+    }
+
+    /// Returns the first cycle after the present one before which orders are replayed or after which metrics are kept.
+    fn next_stop(&self) -> Option<Cycle> {
+        self.next_replay_cycle().into_iter().chain(self.series.next_due(self.cycle)).min()
     }
 }
 
@@ -265,6 +275,19 @@ impl<W: WorldMetrics> Run<W> {
     pub fn metrics(&self) -> W::Metrics {
         self.world.metrics(&self.state, &self.collector, self.cycle, &self.stats())
     }
+
+    /// Keeps the present metrics as a row of the run over time.
+    fn keep_metrics(&mut self) {
+        let metrics = self.metrics();
+        self.series.push(self.cycle, &metrics);
+    }
+
+    /// Starts to keep metrics over time.
+    fn start_series(&mut self) {
+        let metrics = self.metrics();
+        let interval = self.config.series_interval();
+        self.series.start(interval, &metrics, |name| self.world.metric_meaning(name));
+    }
 }
 
 impl<W: RecordableWorld> Run<W> {
@@ -348,11 +371,15 @@ where
         while done < cycles {
             self.apply_due();
             let mut segment = cycles - done;
-            if let Some(next) = self.next_replay_cycle() {
+            if let Some(next) = self.next_stop() {
                 segment = segment.min(next - self.cycle);
             }
+            let next_row = self.series.next_due(self.cycle);
             let segment_done = self.run_segment(segment);
             done += segment_done;
+            if next_row == Some(self.cycle) {
+                self.keep_metrics();
+            }
             // Rows must be recorded, or the run is over: where a segment ends with the cycle that ends the run, its length
             // does not say so.
             if segment_done < segment || self.world.is_over(&self.state) {
@@ -384,6 +411,7 @@ where
         }
         self.cycle = cycle;
         self.last_applied = None;
+        self.series.clear();
         Ok(())
     }
 
@@ -397,6 +425,7 @@ where
         if self.world.records_controls(&self.collector) {
             self.control_rows.set_table(Some(control::controls_table()));
         }
+        self.start_series();
         self.prepare_scratches();
     }
 
@@ -404,6 +433,7 @@ where
         let mut schemas = self.world.schemas(&self.collector);
         schemas.extend(self.order_rows.schema());
         schemas.extend(self.control_rows.schema());
+        schemas.extend(self.series.schema());
         schemas
     }
 
@@ -417,9 +447,13 @@ where
         self.collect();
         self.world.record(&mut self.state, &mut self.collector, self.cycle, recorder)?;
         // These tables follow those of the world.
-        let blocks = [self.order_rows.take(), self.control_rows.take()].into_iter().flatten();
+        let blocks = [self.order_rows.take(), self.control_rows.take(), self.series.take()];
         let mut tables = self.world.schemas(&self.collector).len()..;
-        blocks.zip(&mut tables).try_for_each(|(block, table)| recorder.append(table, &block))
+        blocks
+            .into_iter()
+            .flatten()
+            .zip(&mut tables)
+            .try_for_each(|(block, table)| recorder.append(table, &block))
     }
 
     fn scenery(&self) -> Scenery {

@@ -1,5 +1,6 @@
 //! The settings of a run, its conflict groups, and its processor time.
 
+use crate::series::SeriesInterval;
 use crate::units::Cycle;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,9 @@ pub struct RunConfig {
     pub cycles: Cycle,
     /// Number of cycles between two checkpoints; 0 for none.
     pub checkpoint_every: Cycle,
+    /// Number of cycles between two rows of the metrics over time, 0 for none; `None` for one that follows from the
+    /// number of cycles.
+    pub series_every: Option<Cycle>,
 }
 
 impl RunConfig {
@@ -21,6 +25,14 @@ impl RunConfig {
     /// none.
     pub fn checkpoint_interval(&self) -> Cycle {
         if self.checkpoint_every == 0 { Cycle::MAX } else { self.checkpoint_every }
+    }
+
+    /// Returns the cycles after which a recorded run keeps its metrics.
+    pub fn series_interval(&self) -> SeriesInterval {
+        match self.series_every {
+            Some(every) => SeriesInterval::every_cycles(every),
+            None => SeriesInterval::from_planned_cycles(self.cycles),
+        }
     }
 }
 

@@ -286,7 +286,8 @@ pub trait ControllableWorld: World {
 
 /// The measurements of a run, and texts for people.
 pub trait WorldMetrics: World {
-    /// The measurements of a run; the names of its fields are the names of metrics.
+    /// The measurements of a run; the names of its fields are the names of metrics. It has the same fields in every
+    /// cycle of a run, because they are the columns of the table of metrics over time.
     type Metrics: Serialize;
 
     /// Returns the metrics of the run so far.
@@ -297,6 +298,12 @@ pub trait WorldMetrics: World {
         now: Cycle,
         stats: &RunStats,
     ) -> Self::Metrics;
+
+    /// Returns the thing that a metric counts or measures, in a phrase, by its dotted name, and of the number of entries of
+    /// a list by `NAME_count`; empty for one without words. Lists without words have no column over time.
+    fn metric_meaning(&self, _name: &str) -> &'static str {
+        ""
+    }
 
     /// Returns the metrics of each agent, as a JSON array.
     fn agent_metrics(&self, state: &Self::State, collector: &Self::Collector, now: Cycle) -> Value;

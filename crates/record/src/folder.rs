@@ -39,6 +39,8 @@ pub struct NewRun {
     pub cycle_origin: CycleOrigin,
     /// The MCAP file that is written at the same time.
     pub mcap: Option<McapRequest>,
+    /// Number of cycles between the first rows of the table of metrics over time; 0 for none.
+    pub series_every: u64,
 }
 
 /// The state from which a stopped run goes on.
@@ -95,6 +97,7 @@ impl RunFolder {
         let mut manifest = Manifest {
             build: Some(run.build.clone()),
             mcap: run.mcap.clone(),
+            series_every: Some(run.series_every),
             ..manifest::new_manifest(&run.world, *seed, program_version, run.cycles_planned)
         };
         // A flight is marked before its first cycle: however early it is killed, it is not taken for a simulation.

@@ -65,6 +65,10 @@ pub struct Manifest {
     /// The MCAP file that was asked for, if one was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mcap: Option<McapRequest>,
+    /// Number of cycles between the first rows of the table of metrics over time, 0 for none; early folders do not have
+    /// that table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series_every: Option<u64>,
 }
 
 impl Manifest {
@@ -114,6 +118,7 @@ pub(crate) fn new_manifest(
         origins: Vec::new(),
         is_cut_off: false,
         mcap: None,
+        series_every: None,
     }
 }
 

@@ -75,6 +75,7 @@ impl RunRecorder {
             mcap: recording.mcap.and_then(|(file, every)| {
                 McapRequest::new(&resolve_path(path), &resolve_path(file), every)
             }),
+            series_every: plan.series_interval().every(),
         };
         let folder = RunFolder::create_with_files(path, &new, &resolved.files, recording.existing)?;
         Ok(Self::start_as(folder, run, recording.cycle_origin)?)

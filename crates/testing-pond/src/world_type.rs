@@ -107,7 +107,7 @@ impl WorldType for Pond {
         });
         Ok(Box::new(CompiledPond {
             world,
-            plan: RunConfig { name, seed, cycles, checkpoint_every },
+            plan: RunConfig { name, seed, cycles, checkpoint_every, series_every: None },
         }))
     }
 }

@@ -17,6 +17,7 @@ fn a_recorded_run_leaves_what_the_readme_lists() {
         "run.json",
         "run.lock",
         "scenario.toml",
+        "series",
         "summary.json",
         "trajectories",
         "trajectories.png",

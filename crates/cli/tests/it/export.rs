@@ -79,7 +79,10 @@ fn frames_change_no_result_and_equal_runs_give_equal_bytes() {
 fn tables_are_exported_whole_or_in_part() {
     let place = recorded();
     let done = place.json(&["export", "r", "--to", "csv"]);
-    assert_eq!(done["written"], json!(["r-csv/events.csv", "r-csv/trajectories.csv"]));
+    assert_eq!(
+        done["written"],
+        json!(["r-csv/events.csv", "r-csv/series.csv", "r-csv/trajectories.csv"])
+    );
     let lines = |name: &str| place.read(name).lines().count();
     assert_eq!(lines("r-csv/trajectories.csv"), 1 + 400 * 4);
     let part = ["export", "r", "--to", "csv", "--table", "trajectories"];
@@ -185,7 +188,7 @@ fn wrong_exports_are_told_and_write_nothing() {
         (&["s.toml", "--to", "csv"], "no folder"),
         (&["foreign.mcap", "--to", "gif"], "damaged"),
         (&["r.mcap", "--to", "csv"], "no tables"),
-        (&["r", "--to", "csv", "--table", "tracks"], "events, trajectories"),
+        (&["r", "--to", "csv", "--table", "tracks"], "events, series, trajectories"),
         (&["r", "--to", "gif", "--from", "401"], "give 0 to 400"),
         (&["r", "--to", "gif", "--from", "40", "--until", "30"], "--until 30"),
         (&["r", "--to", "svg", "--fps", "10"], "--to svg"),

@@ -109,8 +109,8 @@ fn a_fleet_whose_folder_or_table_is_deleted_while_it_flies_ends_and_names_it() {
         return;
     }
     let realtime = ["--clock", "realtime", "--speed", "30"];
-    let simulated_tables = ["events", "optimizations", "trajectories"];
-    let flown_tables = ["controls", "events", "optimizations", "trajectories"];
+    let simulated_tables = ["events", "optimizations", "series", "trajectories"];
+    let flown_tables = ["controls", "events", "optimizations", "series", "trajectories"];
     for (clock, names, gone) in [
         (&[][..], &simulated_tables[..], "r"),
         (&realtime, &flown_tables, "r"),
@@ -362,6 +362,7 @@ fn a_flight_of_which_nothing_is_on_disk_is_an_error_and_no_empty_table() {
         cycles_planned: 12,
         cycle_origin: sidestep_record::CycleOrigin::Flown,
         mcap: None,
+        series_every: 0,
     };
     let refuse = sidestep_record::IfExists::Refuse;
     drop(sidestep_record::RunFolder::create(&place.path("r"), &flight, refuse).expect("created"));

@@ -32,6 +32,7 @@ mod pictures;
 mod readers;
 mod report;
 mod reproduce;
+mod series;
 mod slurm;
 mod stops;
 mod studio;

@@ -31,7 +31,7 @@ fn killed(place: &TestFolder) {
 
 /// Asserts that the rows of a table are the same, in the same order.
 fn assert_same_rows(place: &TestFolder, a: &str, b: &str) {
-    for table in ["trajectories", "events"] {
+    for table in ["trajectories", "events", "series"] {
         let read = |folder: &str| read_table(&place.path(folder), table, ..).expect("a table");
         let (a, b) = (read(a), read(b));
         assert!(a.complete && b.complete && a.rows() > 0);
@@ -128,7 +128,7 @@ fn a_run_whose_folder_is_deleted_moved_or_replaced_ends_at_once_and_writes_nowhe
         let args = ["--set", "record.checkpoint_every=1000000000"];
         let child = place.start(&[&ENDLESS[..], &args].concat());
         // The last that it makes before its first cycle.
-        let tables = ["r/events.partial", "r/trajectories.partial"];
+        let tables = ["r/events.partial", "r/trajectories.partial", "r/series.partial"];
         wait_for("the tables", || tables.iter().all(|table| place.path(table).exists()));
         let folder = place.path("r");
         match change {
@@ -155,7 +155,7 @@ fn a_run_whose_folder_is_deleted_moved_or_replaced_ends_at_once_and_writes_nowhe
 
 #[test]
 fn a_run_whose_table_is_deleted_ends_at_the_next_seal_and_names_it() {
-    for table in ["trajectories", "events"] {
+    for table in ["trajectories", "events", "series"] {
         let place = TestFolder::new();
         let child = place.start(&[&ENDLESS[..], &["--json"]].concat());
         wait_for("a checkpoint", || place.path("r/checkpoint.bin").exists());

@@ -3,16 +3,13 @@
 use super::plan::Trial;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use sidestep_kernel::series::is_clock_metric;
 use sidestep_kernel::{Cycle, InputError, Interrupt, Simulation};
 use sidestep_scenario::{Source, Worlds};
 
 /// Cycles between two checks whether to continue: few, so that a run stops soon, and enough for
 /// checks to cost nothing.
 const INTERRUPT_CHECK_CYCLES: Cycle = 256;
-
-/// Endings of the names of metrics that a clock measured: they are kept beside the results, because
-/// they differ when the trial is run again.
-const CLOCK_METRIC_SUFFIXES: [&str; 2] = ["cpu_s", "wall_s"];
 
 /// The outcome of a trial, which becomes one row of the table of runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,10 +58,6 @@ pub fn metric_names(simulation: &dyn Simulation) -> Vec<String> {
     let names = flattened(&simulation.metrics()).into_iter().map(|(name, _)| name);
     let names = names.filter(|name| !is_clock_metric(name));
     std::iter::once("cycles_run".to_string()).chain(names).collect()
-}
-
-fn is_clock_metric(name: &str) -> bool {
-    CLOCK_METRIC_SUFFIXES.iter().any(|end| name.ends_with(end))
 }
 
 impl TrialRun {

@@ -60,6 +60,7 @@ pub(crate) fn new_run() -> NewRun {
         cycles_planned: 100,
         cycle_origin: CycleOrigin::Simulated,
         mcap: None,
+        series_every: 0,
     }
 }
 

@@ -44,7 +44,7 @@ fn a_run_that_was_stopped_comes_to_the_same_end_with_the_same_rows() {
     assert_eq!((half.cycles, half.status), (5001, RunStatus::Incomplete));
     let resumed = resume(None).expect("resumed").run_to_end(&NoWatcher).expect("no bug");
     assert_eq!((&resumed.digest, &resumed.metrics), (&in_one_go.digest, &in_one_go.metrics));
-    for table in ["trajectories", "events"] {
+    for table in ["trajectories", "events", "series"] {
         let rows = |folder| read_table(folder, table, ..).expect("whole").columns;
         assert!(rows(&whole) == rows(&parts), "{table}");
     }
@@ -64,7 +64,7 @@ fn a_run_that_was_interrupted_within_a_cycle_comes_to_the_same_end_with_the_same
         let resumed = ManagedRun::resume(&WORLDS, &parts, 2, None).expect("as after a kill");
         let resumed = resumed.run_to_end(&NoWatcher).expect("no bug");
         assert_eq!((&resumed.digest, &resumed.metrics), (&in_one_go.digest, &in_one_go.metrics));
-        for table in ["trajectories", "events"] {
+        for table in ["trajectories", "events", "series"] {
             let rows = |folder| read_table(folder, table, ..).expect("whole").columns;
             assert!(rows(&whole) == rows(&parts), "{table}");
         }

@@ -43,8 +43,17 @@ fn named_paths(text: &str) -> Vec<&str> {
         let plain = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
         span.contains('/') && span.chars().all(plain)
     };
-    let elsewhere =
-        ["runs/", "sweeps/", "trajectories/", "events/", "shares/", "variants/", "../", "/"];
+    let elsewhere = [
+        "runs/",
+        "sweeps/",
+        "trajectories/",
+        "events/",
+        "series/",
+        "shares/",
+        "variants/",
+        "../",
+        "/",
+    ];
     // Types of ROS 2 are written as paths are.
     let is_ours =
         |span: &&str| !elsewhere.iter().any(|p| span.starts_with(p)) && !span.contains("_msgs/");

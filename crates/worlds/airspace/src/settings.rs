@@ -133,6 +133,8 @@ pub struct RecordSection {
     pub controls: bool,
     /// Number of cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,
+    /// Cycles between two rows of the metrics over time, 0 for none; if left out, one that gives a run a thousand rows.
+    pub series_every: Option<u64>,
 }
 
 impl Default for RecordSection {
@@ -143,6 +145,7 @@ impl Default for RecordSection {
             optimizations: true,
             controls: false,
             checkpoint_every: 1000,
+            series_every: None,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::decide::OptimizationRecord;
 use super::events::Event;
+use super::metric_info::METRIC_INFO;
 use super::metrics::{self, Counters, Metrics};
 use super::rows::{FlownLeg, RecordBuffers};
 use super::scenario::CompiledAirspace;
@@ -21,7 +22,7 @@ use sidestep_kernel::{
     CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld,
     Run, RunConfig, RunInputs, RunStats, World, WorldMetrics, WorldView,
 };
-use sidestep_scenario::Source;
+use sidestep_scenario::{Source, metric_label};
 use std::sync::Arc;
 
 /// A run of an airspace, which is a [`RemotePilotRun`](crate::RemotePilotRun) as well.
@@ -56,6 +57,7 @@ impl CompiledAirspace {
             seed: self.seed,
             cycles: self.cycles,
             checkpoint_every: self.record.checkpoint_every,
+            series_every: self.record.series_every,
         }
     }
 }
@@ -283,6 +285,10 @@ impl WorldMetrics for AirspaceWorld {
         _: &RunStats,
     ) -> Metrics {
         metrics::metrics(self, state, now, &collector.counters, collector.decide_ns as f64 / 1e9)
+    }
+
+    fn metric_meaning(&self, name: &str) -> &'static str {
+        metric_label(&METRIC_INFO, name).meaning
     }
 
     fn agent_metrics(&self, state: &AirspaceState, _: &Collector, _: Cycle) -> Value {

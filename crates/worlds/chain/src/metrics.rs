@@ -383,19 +383,16 @@ metrics! {
 }
 
 impl RobotMetrics {
-    fn from_tally(tally: &RobotTally) -> Option<Self> {
-        if tally.steps == 0 {
-            return None;
-        }
-        let steps = tally.steps as f64;
-        Some(Self {
+    fn from_tally(tally: &RobotTally) -> Self {
+        let steps = tally.steps.max(1) as f64;
+        Self {
             bumper_events: tally.bumper_events,
             bumper_part: tally.bumper_steps as f64 / steps,
             held_part: tally.held_steps as f64 / steps,
             mean_lag_m: tally.lag_sum_m / steps,
             max_lag_m: tally.max_lag_m,
             min_gap_m: tally.min_gap_m,
-        })
+        }
     }
 }
 
@@ -427,9 +424,10 @@ pub struct ChainMetrics {
 }
 
 impl Metrics {
-    /// Sums the tallies of the chains; `progress` has one entry per chain.
+    /// Sums the tallies of the chains, of which some have robots on wheels or none; `progress` has one entry per chain.
     pub(super) fn from_tallies(
         tallies: &[ChainTally],
+        has_robots: bool,
         progress: &[f64],
         cpu_s: f64,
         timed_steps: u64,
@@ -469,7 +467,7 @@ impl Metrics {
             contacts_lost: sum_over_chains(tallies, |t| t.contacts_lost),
             deadlines_missed: sum_over_chains(tallies, |t| t.deadlines_missed),
             stood: sum_over_chains(tallies, |t| t.stood),
-            robots: RobotMetrics::from_tally(&robots),
+            robots: has_robots.then(|| RobotMetrics::from_tally(&robots)),
         }
     }
 }

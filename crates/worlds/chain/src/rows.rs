@@ -122,12 +122,11 @@ impl RecordBuffers {
     /// Starts to keep rows, for those tables that will have some.
     pub(super) fn start<const D: usize>(&mut self, world: &ChainWorld<D>) {
         let record = self.record;
-        let has_robots = world.chains.iter().any(|spec| spec.robots.is_some());
         let has_arms = world.chains.iter().any(|spec| spec.arm.is_some());
         let has_movers = !world.movers.is_empty();
         self.trajectories.set_table(record.trajectories.then(|| trajectories_table(D)));
         self.joints.set_table((record.joints && has_arms).then(joints_table));
-        self.robots.set_table((record.robots && has_robots).then(robots_table));
+        self.robots.set_table((record.robots && world.has_robots()).then(robots_table));
         self.movers.set_table((record.movers && has_movers).then(|| movers_table(D)));
         self.events.set_table(record.events.then(events_table));
     }

@@ -278,6 +278,8 @@ pub struct RecordSection {
     pub every: u64,
     /// Cycles between two checkpoints; 0 for none.
     pub checkpoint_every: u64,
+    /// Cycles between two rows of the metrics over time, 0 for none; if left out, one that gives a run a thousand rows.
+    pub series_every: Option<u64>,
 }
 
 impl Default for RecordSection {
@@ -291,6 +293,7 @@ impl Default for RecordSection {
             controls: false,
             every: 1,
             checkpoint_every: 1000,
+            series_every: None,
         }
     }
 }

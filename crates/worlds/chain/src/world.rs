@@ -220,6 +220,11 @@ impl<const D: usize> ChainSpec<D> {
 }
 
 impl<const D: usize> ChainWorld<D> {
+    /// Returns whether some chain has robots on wheels.
+    pub(crate) fn has_robots(&self) -> bool {
+        self.chains.iter().any(|spec| spec.robots.is_some())
+    }
+
     /// Returns whether nothing is in the way of the only chain, not even the chain itself.
     pub(crate) fn is_collision_impossible(&self) -> bool {
         let is_empty = self.obstacles.is_empty() && self.movers.is_empty();

@@ -1,6 +1,7 @@
 //! The hooks that a run calls on the world beside its phases.
 
 use super::events::Event;
+use super::metric_info::METRIC_INFO;
 use super::metrics::{ChainMetrics, ChainTally, Metrics};
 use super::rows::RecordBuffers;
 use super::scenario::{AnyChainScenario, ChainScenario};
@@ -21,7 +22,7 @@ use sidestep_kernel::{
     CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld,
     Run, RunConfig, RunInputs, RunStats, Simulation, World, WorldMetrics, WorldView,
 };
-use sidestep_scenario::Source;
+use sidestep_scenario::{Source, metric_label};
 use std::sync::Arc;
 
 /// A run whose number of dimensions is known; [`chain_run`] is for those who do not know it.
@@ -61,6 +62,7 @@ impl<const D: usize> ChainScenario<D> {
             seed: self.seed,
             cycles: self.cycles,
             checkpoint_every: self.record.checkpoint_every,
+            series_every: self.record.series_every,
         }
     }
 }
@@ -277,7 +279,12 @@ impl<const D: usize> WorldMetrics for ChainWorld<D> {
         let progress: Vec<f64> =
             (0..state.len()).map(|slot| self.progress(slot, &state.body(slot))).collect();
         let steps = tallies.iter().map(|t| t.steps).sum::<u64>() - collector.steps_before;
-        Metrics::from_tallies(&tallies, &progress, effort.cpu_ns as f64 / 1e9, steps)
+        let cpu_s = effort.cpu_ns as f64 / 1e9;
+        Metrics::from_tallies(&tallies, self.has_robots(), &progress, cpu_s, steps)
+    }
+
+    fn metric_meaning(&self, name: &str) -> &'static str {
+        metric_label(&METRIC_INFO, name).meaning
     }
 
     fn agent_metrics(&self, state: &ChainWorldState<D>, _: &Collector, _: Cycle) -> Value {

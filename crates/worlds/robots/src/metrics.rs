@@ -66,8 +66,7 @@ impl RobotsWorld {
         let body = state.body(id);
         let trips = u64::from(body.trips.get());
         Counters {
-            actions: self.bodies[id as usize].actions_before(cycle)
-                - u64::from(state.delays.missed(id)),
+            actions: self.actions(state, cycle, id),
             contacts,
             contacts_by_kind,
             distance_m: f64::from(body.moves.get()) * self.map.box_size_m,
@@ -79,6 +78,12 @@ impl RobotsWorld {
         }
     }
 
+    /// Returns the actions of a robot before a cycle, without those that a delay took from it.
+    fn actions(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> u64 {
+        let due = self.bodies[id as usize].actions_before(cycle);
+        due - u64::from(state.delays.missed(id))
+    }
+
     /// Returns whether a robot is on a trip. Of one whose actions are ordered, the orders tell: its last trip ended when the
     /// next one began.
     fn is_on_trip(&self, body: &BodyState) -> bool {
@@ -87,24 +92,28 @@ impl RobotsWorld {
         model.behaviour.is_on_trip(&memory_of(body)) || model.is_external && has_ordered_trips
     }
 
-    /// Returns the counters of all robots together after `cycle` cycles.
+    /// Returns the counters of all robots together after `cycle` cycles. Names of kinds are looked up once, and not for
+    /// every robot: a recorded run does this a thousand times.
     pub fn totals(&self, state: &RobotsState, cycle: Cycle) -> Counters {
         let mut total = Counters::default();
         let mut trip_cycles = 0;
+        let mut contacts = vec![0; self.kinds.len()];
         for &id in &self.robots {
-            let one = self.counts(state, cycle, id);
-            trip_cycles += state.body(id).trip_cycles.get();
-            total.actions += one.actions;
-            total.contacts += one.contacts;
-            total.distance_m += one.distance_m;
-            total.trips += one.trips;
-            total.trips_under_way += one.trips_under_way;
-            total.first_visits += one.first_visits;
-            total.delayed_cycles += one.delayed_cycles;
-            for (kind, n) in one.contacts_by_kind {
-                *total.contacts_by_kind.entry(kind).or_default() += n;
+            let body = state.body(id);
+            trip_cycles += body.trip_cycles.get();
+            total.distance_m += f64::from(body.moves.get()) * self.map.box_size_m;
+            total.actions += self.actions(state, cycle, id);
+            total.trips += u64::from(body.trips.get());
+            total.trips_under_way += u64::from(self.is_on_trip(body));
+            total.first_visits += u64::from(body.first_visits.get());
+            total.delayed_cycles += u64::from(state.delays.total(id));
+            let first_contact = id as usize * self.kinds.len();
+            for (kind, sum) in contacts.iter_mut().enumerate() {
+                *sum += u64::from(state.contacts.get(first_contact + kind));
             }
         }
+        total.contacts = contacts.iter().sum();
+        total.contacts_by_kind = self.kinds.iter().cloned().zip(contacts).collect();
         // Over all trips, and not over the robots' means, which would count a slow robot's trips more.
         total.trip_cycles_mean = (total.trips > 0).then(|| trip_cycles as f64 / total.trips as f64);
         total

@@ -443,11 +443,19 @@ pub struct RecordSection {
     pub calibration: bool,
     /// Number of cycles between two checkpoints.
     pub checkpoint_every: u64,
+    /// Cycles between two rows of the metrics over time, 0 for none; if left out, one that gives a run a thousand rows.
+    pub series_every: Option<u64>,
 }
 
 impl Default for RecordSection {
     fn default() -> Self {
-        Self { trajectories: true, events: true, calibration: false, checkpoint_every: 10_000 }
+        Self {
+            trajectories: true,
+            events: true,
+            calibration: false,
+            checkpoint_every: 10_000,
+            series_every: None,
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The hooks of a run beside the phases: start, recording, checkpoints, frames, control and metrics.
 
+use super::metric_info::METRIC_INFO;
 use super::metrics::Metrics;
 use super::rows::Collector;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
@@ -19,7 +20,7 @@ use sidestep_kernel::{
     CheckpointableWorld, ControllableWorld, Cycle, Digest, InputError, RecordableWorld, Run,
     RunConfig, RunInputs, RunStats, World, WorldMetrics, WorldView,
 };
-use sidestep_scenario::Source;
+use sidestep_scenario::{Source, metric_label};
 use std::sync::Arc;
 
 /// A run of a robots world, for callers that read its state or its typed metrics.
@@ -52,6 +53,7 @@ impl Compiled {
             seed: self.seed,
             cycles: self.cycles,
             checkpoint_every: self.record.checkpoint_every,
+            series_every: self.record.series_every,
         }
     }
 
@@ -216,6 +218,10 @@ impl WorldMetrics for RobotsWorld {
 
     fn metrics(&self, state: &RobotsState, _: &Collector, now: Cycle, stats: &RunStats) -> Metrics {
         RobotsWorld::metrics(self, state, now, &stats.groups)
+    }
+
+    fn metric_meaning(&self, name: &str) -> &'static str {
+        metric_label(&METRIC_INFO, name).meaning
     }
 
     fn agent_metrics(&self, state: &RobotsState, _: &Collector, now: Cycle) -> Value {
