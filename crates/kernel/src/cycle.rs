@@ -6,6 +6,9 @@
 //!                         barrier                barrier          barrier
 //! ```
 //!
+//! In worlds that plan ([`crate::world::Phases::has_plan`]), worker 0 does so alone before all that, at the price of one
+//! more barrier; in all others nothing of it is left.
+//!
 //! Agents that decide together ([`crate::world::DecisionMode::Joint`]) do so in the last phase.
 //!
 //! The source paper merges tasks while they are inserted into pool two and so needs two barriers,
@@ -26,7 +29,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Time of worker 0 in each phase, waiting at the barrier included, in nanoseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct PhaseTimes {
-    /// Every body perceives, decides (where agents decide alone), and claims.
+    /// Every body perceives, decides (where agents decide alone), and claims; before that, the plan of worlds that have
+    /// one.
     pub claim_ns: u64,
     /// Claims become groups.
     pub join_ns: u64,
@@ -349,6 +353,13 @@ impl<W: Phases> CycleSegmentContext<'_, W> {
         // Three pools of tasks per cycle, one per phase, counted from the start of the segment.
         let pool = 3 * (now - segment.from);
         let context = &mut PhaseContext { world, state, now, clock, scratch };
+        if world.has_plan() {
+            if leader.is_some() {
+                interrupt::check();
+                W::plan(context);
+            }
+            worker.wait_at_barrier();
+        }
         let n = world.body_count(state);
         worker.for_each_chunk(pool, n, |bodies| {
             interrupt::check();

@@ -1,7 +1,7 @@
 //! The traits that a world implements, one for each role.
 //!
 //! ```text
-//! Phases           claim, join, act: called by the cycle, on any number of workers
+//! Phases           claim, join, act: called by the cycle, on any number of workers; plan: on one
 //! Auction          bids for claims, an extension of some worlds
 //! World            its name, and the results of workers between cycles
 //! WorldRecording   rows of tables, and events
@@ -73,6 +73,16 @@ pub trait Phases: Sync + Sized {
     /// Moves bodies to other slots, occasionally between cycles, so that neighbors in the world are
     /// neighbors in memory and each worker stays in one part of both. No result may depend on it.
     fn reorder_slots(&self, _: &mut Self::State) {}
+
+    /// Returns whether there is a phase *plan*, which costs a barrier in each cycle.
+    fn has_plan(&self) -> bool {
+        false
+    }
+
+    /// *Plan*: gives agents that are led together what they are about to do, from the frozen state, before any body
+    /// claims. Called on one worker while all others wait, and only where [`Phases::has_plan`] holds. It is a part of
+    /// the environment: it may read the whole state, and what it remembers is part of that.
+    fn plan(_: &mut PhaseContext<'_, Self>) {}
 
     /// *Claim*: each body of `bodies` that is due perceives the frozen state, decides (where agents
     /// decide alone), and claims everything that its action may need. Writes only the intents and claims of

@@ -22,6 +22,9 @@ use crate::descent::{DescentCache, FieldKey};
 use crate::graph::{Graphs, NONE};
 use crate::pose::{Action, ActionModel, first_turn, quarter_turns};
 
+/// Reserves a box for a body that is no agent: the number of no agent.
+const OTHERS: u32 = NONE - 1;
+
 /// What an agent needs to choose its box.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Member {
@@ -143,6 +146,21 @@ impl Inheritance {
         false
     }
 
+    /// Lets nobody enter a box; outside of the grid, nobody does.
+    pub(crate) fn block(&mut self, position: (u32, u32)) {
+        let index = self.graphs.all().first().and_then(|graph| graph.index(position));
+        if let Some(index) = index {
+            self.reserved[index as usize] = OTHERS;
+        }
+    }
+
+    /// Lets an agent stay, which must be before any other has a box.
+    pub(crate) fn stay(&mut self, agent: usize) {
+        if self.status.get(agent) == Some(&Status::Undecided) {
+            self.decide(agent, self.members[agent].now);
+        }
+    }
+
     /// Gives an agent its box after the step. Returns whether nobody else has it.
     pub(crate) fn force(&mut self, agent: usize, to: u32) -> bool {
         let now = self.members[agent].now;
@@ -230,7 +248,7 @@ impl Inheritance {
         self.next[agent] = now;
         for covered in self.graphs.of(agent).body(now) {
             let follower = std::mem::replace(&mut self.reserved[covered], agent as u32);
-            if follower != NONE && follower != agent as u32 {
+            if follower < OTHERS && follower != agent as u32 {
                 self.holders.push(follower);
             }
         }
@@ -510,7 +528,7 @@ impl Inheritance {
         let now = self.members[agent].now;
         for covered in self.graphs.of(agent).body(now) {
             let other = self.reserved[covered];
-            if other != NONE && self.status[other as usize] == Status::Decided {
+            if other < OTHERS && self.status[other as usize] == Status::Decided {
                 self.is_broken = true;
             }
         }

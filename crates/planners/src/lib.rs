@@ -23,7 +23,7 @@ mod tests;
 
 pub use dependency_graph::{DependencyGraph, Permission};
 pub use instance::{Agent, Bounds, Instance};
-pub use pibt::{Pibt, PibtConfig, PibtState};
+pub use pibt::{Obstructions, Pibt, PibtConfig, PibtState};
 pub use plan::{Costs, Plan, PlanError};
 pub use pose::{Action, ActionModel, GridPose};
 pub use sidestep_kernel::{InputError, Seed};

@@ -71,6 +71,15 @@ pub struct PibtConfig {
     pub max_cache_bytes: usize,
 }
 
+/// What keeps agents from acting in one step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Obstructions<'a> {
+    /// Boxes (column, row) in which other bodies stand: no agent enters them.
+    pub boxes: &'a [(u32, u32)],
+    /// Agents that cannot act, by their number: each stays, and nobody enters its boxes.
+    pub idle: &'a [u32],
+}
+
 impl Default for PibtConfig {
     fn default() -> Self {
         Self { model: ActionModel::Turns, seed: Seed(0), max_cache_bytes: 512 << 20 }
@@ -120,6 +129,21 @@ impl Pibt {
         poses: &[GridPose],
         goals: &[Option<(u32, u32)>],
     ) -> Result<&[Action], InputError> {
+        self.step_among(state, poses, goals, Obstructions::default())
+    }
+
+    /// As [`Pibt::step`], among bodies that are no agents, and where some agents cannot act in this step. Directions to
+    /// goals know neither: agents wait or step aside at them, and find no way around.
+    ///
+    /// # Errors
+    /// As [`Pibt::step`].
+    pub fn step_among(
+        &mut self,
+        state: &mut PibtState,
+        poses: &[GridPose],
+        goals: &[Option<(u32, u32)>],
+        obstructions: Obstructions<'_>,
+    ) -> Result<&[Action], InputError> {
         self.check_lengths(&[
             ("ages", state.ages.len()),
             ("last goals", state.goals.len()),
@@ -138,6 +162,12 @@ impl Pibt {
             if !self.engine.place(member, pose.position()) {
                 self.misplaced.push(agent as u32);
             }
+        }
+        for &position in obstructions.boxes {
+            self.engine.block(position);
+        }
+        for &agent in obstructions.idle {
+            self.engine.stay(agent as usize);
         }
         self.sort(&state.ages);
         self.engine.run(self.order.iter().map(|&(_, agent)| agent));

@@ -1,6 +1,8 @@
 use super::floors::{Problem, agent, check_step, draw, problems, small_agents};
 use crate::pibt::plan;
-use crate::{Action, ActionModel, GridPose, Instance, Pibt, PibtConfig, PibtState, Seed};
+use crate::{
+    Action, ActionModel, GridPose, Instance, Obstructions, Pibt, PibtConfig, PibtState, Seed,
+};
 use proptest::prelude::*;
 
 const MODELS: [ActionModel; 2] = [ActionModel::Turns, ActionModel::Classical];
@@ -215,6 +217,25 @@ fn the_agent_that_was_longest_without_its_goal_has_priority_and_a_new_goal_ends_
         pibt.step(&mut state, &poses, &new_goals).unwrap();
         assert_eq!(state.ages, [ages[0] + 2, 0]);
     }
+}
+
+#[test]
+fn nobody_enters_boxes_of_others_and_an_agent_that_cannot_act_is_not_pushed() {
+    let free = crate::FreeSpace::new(4, 1, |_, _| true);
+    let mut pibt = Pibt::new(&free, &[1, 1], config(ActionModel::Turns, 1)).unwrap();
+    let poses = [GridPose::new(0, 0, 0), GridPose::new(1, 0, 0)];
+    let goals = [Some((3, 0)), Some((3, 0))];
+    let mut actions = |boxes: &[(u32, u32)], idle: &[u32]| {
+        let obstructions = Obstructions { boxes, idle };
+        let mut state = PibtState::new(2);
+        pibt.step_among(&mut state, &poses, &goals, obstructions).unwrap().to_vec()
+    };
+    assert_eq!(actions(&[], &[]), [Action::Forward, Action::Forward]);
+    assert_eq!(actions(&[(2, 0)], &[]), [Action::Wait, Action::Wait]);
+    assert_eq!(actions(&[], &[1]), [Action::Wait, Action::Wait]);
+    assert_eq!(actions(&[], &[0]), [Action::Wait, Action::Forward]);
+    // A box outside of the floor and an agent that is not there are nothing.
+    assert_eq!(actions(&[(9, 9)], &[7]), [Action::Forward, Action::Forward]);
 }
 
 #[test]
