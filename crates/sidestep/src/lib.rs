@@ -194,6 +194,7 @@ pub use sidestep_kernel as kernel;
 pub use sidestep_learn as learn;
 pub use sidestep_map as map;
 pub use sidestep_map::{Cell, GridMap, office, planning};
+pub use sidestep_planners as planners;
 pub use sidestep_rods as rods;
 pub use sidestep_scenario as scenario;
 pub use sidestep_session as session;

@@ -26,7 +26,8 @@ pub use stall_detector::StallDetector;
 pub use wander::Wander;
 
 pub use super::alias_table::UNSEEN;
-use super::effector::{ActionId, LEFT, RIGHT, Side};
+pub use super::effector::ActionId;
+use super::effector::{LEFT, RIGHT, Side};
 use super::sensor::{NOTHING, Reading};
 pub use sidestep_error_models::RandomPolicy;
 use sidestep_kernel::stream::Draws;
@@ -199,6 +200,12 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
     /// robots need not perceive twice.
     fn is_external(&self) -> bool {
         false
+    }
+
+    /// Returns the boxes, any of which is the present goal of a robot at this place, where a planner leads it: (column,
+    /// row) of its lower-left box. None for robots that find their way themselves.
+    fn planned_goals(&self, _at: (u32, u32), _memory: &Memory) -> &[(u32, u32)] {
+        &[]
     }
 
     /// Returns the flow fields of all places that it wants to reach, so that a check can report those that

@@ -37,6 +37,7 @@ impl RobotsWorld {
             return None;
         }
         let copy = state.trial_copy(self);
+        self.plan(&copy, now);
         let slot = copy.slot_of_id[id as usize];
         let kind = &self.kinds[usize::from(self.type_of(id).kind)];
         let inspection = Inspection::new(body, now, format!("{kind} {id}"));

@@ -7,6 +7,7 @@
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
+//! team.rs: before a cycle, the planners of teams                   world.rs says which robots they lead
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio
 //! ```
@@ -44,6 +45,7 @@ pub mod scenario;
 mod simultaneous;
 pub mod state;
 mod table_notes;
+mod team;
 mod text;
 mod view;
 pub mod world;
@@ -189,6 +191,14 @@ impl Phases for RobotsWorld {
         if self.storage == StorageOrder::Spatial {
             state.arrange(self);
         }
+    }
+
+    fn has_plan(&self) -> bool {
+        !self.teams_led.is_empty()
+    }
+
+    fn plan(phase: &mut PhaseContext<'_, Self>) {
+        phase.world.plan(phase.state, phase.now);
     }
 
     #[inline]

@@ -31,6 +31,8 @@ metrics! {
         pub first_visits: u64 => "boxes covered for the first time",
         /// Cycles in which a robot was delayed, of all robots; 0 unless an effector has delays.
         pub delayed_cycles: u64 => "delays of all robots",
+        /// Times that a robot was elsewhere than its planner had planned, of all robots; 0 without `[robots.planner]`.
+        pub off_plan: u64 => "times off the plan",
     }
 }
 
@@ -41,6 +43,8 @@ metrics! {
         /// Sums over all robots.
         #[serde(flatten)]
         pub total: Counters,
+        /// Calls of planners, one for each team and cycle in which it acts; 0 without `[robots.planner]`.
+        pub plans: u64 => "calls of planners",
         /// Share of the free boxes that a robot has covered, 0 to 1. Boxes that robots stand in at the start count.
         pub coverage: f64 => "share of the floor covered",
         /// Share of actions that ended in a contact, 0 to 1.
@@ -75,6 +79,7 @@ impl RobotsWorld {
             trips_under_way: u64::from(self.is_on_trip(body)),
             first_visits: u64::from(body.first_visits.get()),
             delayed_cycles: u64::from(state.delays.total(id)),
+            off_plan: u64::from(state.off_plan(self, id)),
         }
     }
 
@@ -107,6 +112,7 @@ impl RobotsWorld {
             total.trips_under_way += u64::from(self.is_on_trip(body));
             total.first_visits += u64::from(body.first_visits.get());
             total.delayed_cycles += u64::from(state.delays.total(id));
+            total.off_plan += u64::from(state.off_plan(self, id));
             let first_contact = id as usize * self.kinds.len();
             for (kind, sum) in contacts.iter_mut().enumerate() {
                 *sum += u64::from(state.contacts.get(first_contact + kind));
@@ -132,6 +138,7 @@ impl RobotsWorld {
         let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {
             coverage: (self.boxes_covered_at_start() + total.first_visits) as f64 / free as f64,
+            plans: self.plans_before(cycle),
             contacts_per_action: total.contacts as f64 / total.actions.max(1) as f64,
             group_sizes: groups.counts[..used].to_vec(),
             largest_group: groups.largest,

@@ -25,6 +25,8 @@ pub(crate) const RUN: Purpose = Purpose(9);
 /// The heading that starts where the policy `right_of_way` leaves a tie; the entity is the group's
 /// smallest id.
 pub(crate) const RIGHT_OF_WAY: Purpose = Purpose(10);
+/// The seed of a planner; the entity is its first robot.
+pub(crate) const PLAN: Purpose = Purpose(11);
 /// Readings of the sensor with this number on its robot: from 16 on, so that there is room for
 /// further purposes below.
 pub(crate) const fn sense(sensor: usize) -> Purpose {

@@ -295,6 +295,23 @@ pub(super) struct RobotSection {
     pub(super) sensors: Vec<Spanned<String>>,
     pub(super) effector: Option<Spanned<String>>,
     pub(super) behaviour: Option<Spanned<BehaviourSection>>,
+    pub(super) planner: Option<Spanned<PlannerSection>>,
+}
+
+/// The planner of a team with common knowledge: it chooses the actions of all robots of the section.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PlannerSection {
+    /// The algorithm.
+    pub(super) method: PlannerMethod,
+}
+
+/// An algorithm of multi-agent path finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum PlannerMethod {
+    /// Priority inheritance with backtracking: plans one step in each cycle.
+    Pibt,
 }
 
 #[derive(Debug, Clone, Deserialize, JsonSchema)]

@@ -6,6 +6,7 @@ use super::broadcast::BroadcastBuffer;
 use super::delay::DelayColumns;
 use super::policy::ConflictPolicy;
 use super::sensor::{FREE, WALL};
+use super::team::TeamState;
 use super::world::{Body, BodyType, RobotsWorld};
 pub use packed::{Facing, LastContact};
 pub(crate) use packed::{Intent, PackedPose};
@@ -45,6 +46,8 @@ pub struct RobotsState {
     pub(crate) entered_by: AtomicColumn<u32>,
     /// Delays of each robot; empty where no robot has any.
     pub(crate) delays: DelayColumns,
+    /// The planners of teams.
+    pub(crate) teams_led: Box<[TeamState]>,
     /// Last broadcast of each robot; empty without radio.
     pub(crate) voices: BroadcastBuffer,
     /// Poses at the start of each cycle, while a run is recorded.
@@ -139,7 +142,8 @@ pub struct BodyRecord {
     pub trip: [u64; 2],
     /// Contacts by the number of the kind touched; where some robots have delays, then four words of the body's delays:
     /// the cycles left, those since the last action, those in all, and the turns missed. They stand here so that
-    /// checkpoints of worlds without delays do not depend on them.
+    /// checkpoints of worlds without delays do not depend on them. For the same reason, of a robot that a planner leads,
+    /// the words that this remembers of it come last.
     pub contacts: Vec<u32>,
 }
 
@@ -180,6 +184,7 @@ impl RobotsState {
             turns: columns(n),
             entered_by: columns(world.walls.len()),
             delays: DelayColumns::new(if world.has_delays { n } else { 0 }),
+            teams_led: TeamState::all(world),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
         }
@@ -199,6 +204,7 @@ impl RobotsState {
             turns: self.turns.clone(),
             entered_by: self.entered_by.clone(),
             delays: self.delays.clone(),
+            teams_led: self.teams_led.iter().map(TeamState::trial_copy).collect(),
             voices: self.voices.clone(),
             frames: None,
         }
@@ -275,6 +281,7 @@ impl RobotsState {
             contacts: (0..kinds)
                 .map(|kind| self.contacts.get(first_contact + kind))
                 .chain(self.delays.words(body.id))
+                .chain(self.plan_words(world, body.id).into_iter().flatten())
                 .collect(),
         }
     }
@@ -299,6 +306,10 @@ impl RobotsState {
         }
         for (record, &slot) in snapshot.bodies.iter().zip(&state.slot_of_id) {
             state.restore_body(world, slot, record);
+            let body = &state.bodies[slot as usize];
+            let words_before = world.kinds.len() + state.delays.words(body.id).count();
+            let words = record.contacts.get(words_before..).unwrap_or_default();
+            state.restore_plan(world, body.id, words, snapshot.cycle);
         }
         state
     }

@@ -7,6 +7,7 @@ use super::delay::Delays;
 use super::effector::{EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
 use super::sensor::{Reading, SensorModel};
+use super::team::Team;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_error_models::beam::BeamModel;
@@ -110,6 +111,8 @@ pub struct RobotsWorld {
     /// The robots as a caller sees them.
     pub(super) teams: Arc<AgentTeams>,
     pub(super) robots: Vec<EntityId>,
+    /// The teams of robots that a planner leads.
+    pub(super) teams_led: Vec<Team>,
     /// Whether there are robots that ask each other to make room.
     pub(super) has_requests: bool,
     /// Whether there are robots that may be delayed.

@@ -5,6 +5,7 @@ use super::sidestep::{SensorTrust, sidestep};
 use super::touch::follow;
 use super::{Behaviour, Decision, Memory, Percept, TripEvent};
 use crate::effector::{ActionId, STAY};
+use sidestep_kernel::column::AtomicCell;
 use sidestep_kernel::stream::Draws;
 use sidestep_map::planning::FlowField;
 use std::sync::Arc;
@@ -18,9 +19,28 @@ pub enum Avoidance {
     Sidestep(SensorTrust),
     /// Keeps to its path until it touches something, then waits or steps aside at random.
     Touch,
+    /// Does what the planner of its team wrote into its memory before the cycle. Holds, for each goal, the boxes where
+    /// the body fits.
+    Team(Vec<Vec<(u32, u32)>>),
 }
 
+/// Word 1 of a robot that a planner leads: the action plus 1, or 0 for none.
+const ORDER_WORD: usize = 1;
+
 impl Avoidance {
+    /// Writes the next action of a robot that a planner leads into its memory. It stands until the robot's next turn.
+    pub(crate) fn order(memory: &[AtomicCell<u32>; 4], action: ActionId) {
+        memory[ORDER_WORD].set(u32::from(action) + 1);
+    }
+
+    /// Returns the boxes of a goal, where a planner chooses among them.
+    fn anchors(&self, goal: usize) -> &[(u32, u32)] {
+        match self {
+            Self::Team(anchors) => anchors.get(goal).map_or(&[], Vec::as_slice),
+            _ => &[],
+        }
+    }
+
     fn step(
         &self,
         goal: CurrentGoal<'_>,
@@ -30,6 +50,10 @@ impl Avoidance {
     ) -> ActionId {
         match self {
             Self::Plan(planner) => planner.step(goal, percept, memory, draws),
+            Self::Team(_) => match std::mem::take(&mut memory.words[ORDER_WORD]) {
+                0 => STAY,
+                order => (order - 1) as ActionId,
+            },
             // Only planners hear requests, and leave a goal for others.
             _ if goal.is_done => STAY,
             Self::Sidestep(trust) => sidestep(*trust, goal.field, percept, memory, draws),
@@ -71,7 +95,7 @@ impl Goto {
     /// repeated list are here.
     fn next_goal(
         &self,
-        percept: &Percept<'_>,
+        at: (u32, u32),
         memory: &mut Memory,
     ) -> (Option<CurrentGoal<'_>>, Option<TripEvent>) {
         let mut trip = None;
@@ -81,7 +105,7 @@ impl Goto {
                 let last = self.goals.last();
                 return (last.map(|field| CurrentGoal { field, is_done: true }), trip);
             };
-            if !field.is_goal(percept.at.0, percept.at.1) {
+            if !field.is_goal(at.0, at.1) {
                 return (Some(CurrentGoal { field, is_done: false }), trip);
             }
             trip = Some(TripEvent::Completed);
@@ -95,13 +119,28 @@ impl Goto {
     }
 }
 
+impl Shuttle {
+    /// Counts the end that is reached here, and returns the next one.
+    fn next_end(&self, at: (u32, u32), memory: &mut Memory) -> (usize, Option<TripEvent>) {
+        let target = (memory.words[GOALS_REACHED_WORD] % 2) as usize;
+        if !self.ends[target].is_goal(at.0, at.1) {
+            return (target, None);
+        }
+        memory.words[GOALS_REACHED_WORD] = memory.words[GOALS_REACHED_WORD].wrapping_add(1);
+        // The first arrival at end 0 only starts the first trip, because a robot may start anywhere.
+        let is_first = memory.words[GOALS_REACHED_WORD] <= 1;
+        let event = if is_first { TripEvent::Started } else { TripEvent::Completed };
+        (1 - target, (target == 0).then_some(event))
+    }
+}
+
 impl Behaviour for Goto {
     fn is_on_trip(&self, memory: &Memory) -> bool {
         (memory.words[GOALS_REACHED_WORD] as usize) < self.goals.len()
     }
 
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let (goal, trip) = self.next_goal(percept, memory);
+        let (goal, trip) = self.next_goal(percept.at, memory);
         let action = goal.map_or(STAY, |goal| self.avoidance.step(goal, percept, memory, draws));
         Decision { trip, ..action.into() }
     }
@@ -112,6 +151,14 @@ impl Behaviour for Goto {
 
     fn flow_fields(&self) -> &[Arc<FlowField>] {
         &self.goals
+    }
+
+    fn planned_goals(&self, at: (u32, u32), memory: &Memory) -> &[(u32, u32)] {
+        // A copy, because the robot itself counts its goals when it decides.
+        let memory = &mut memory.clone();
+        self.next_goal(at, memory);
+        let reached = memory.words[GOALS_REACHED_WORD] as usize;
+        self.avoidance.anchors(reached.min(self.goals.len().saturating_sub(1)))
     }
 }
 
@@ -125,19 +172,14 @@ impl Behaviour for Shuttle {
         &self.ends
     }
 
+    fn planned_goals(&self, at: (u32, u32), memory: &Memory) -> &[(u32, u32)] {
+        // A copy, because the robot itself counts its trips when it decides.
+        let (target, _) = self.next_end(at, &mut memory.clone());
+        self.avoidance.anchors(target)
+    }
+
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
-        let mut trip = None;
-        let mut target = (memory.words[GOALS_REACHED_WORD] % 2) as usize;
-        if self.ends[target].is_goal(percept.at.0, percept.at.1) {
-            memory.words[GOALS_REACHED_WORD] = memory.words[GOALS_REACHED_WORD].wrapping_add(1);
-            if target == 0 {
-                // The first arrival at end 0 only starts the first trip, because a robot may start anywhere.
-                let is_first = memory.words[GOALS_REACHED_WORD] <= 1;
-                let event = if is_first { TripEvent::Started } else { TripEvent::Completed };
-                trip = Some(event);
-            }
-            target = 1 - target;
-        }
+        let (target, trip) = self.next_end(percept.at, memory);
         let goal = CurrentGoal { field: &self.ends[target], is_done: false };
         let action = self.avoidance.step(goal, percept, memory, draws);
         Decision { trip, ..action.into() }

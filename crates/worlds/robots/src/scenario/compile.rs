@@ -6,6 +6,7 @@ mod known_tables;
 mod map;
 mod people_and_doors;
 mod placer;
+mod planner;
 mod remarks;
 mod robots;
 pub(super) mod unused_keys;
@@ -29,7 +30,7 @@ use crate::decide::{
     Announce, Avoidance, Behaviour, External, Goto, Planner, Replay, Sector, SensorTrust, Shuttle,
     StallDetector, Wander,
 };
-use crate::effector::{EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition};
+use crate::effector::{ActionId, EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition};
 use crate::policy::ConflictPolicy;
 use crate::purpose;
 use crate::sensor::SensorModel;
@@ -210,6 +211,7 @@ impl<'a> Compiler<'a> {
         let has_requests = self.has_requests();
         let has_delays = self.has_delays();
         let kind_rank = self.kind_rank()?;
+        let teams_led = placer.teams_led();
         let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
             regime: self.file.regime,
@@ -223,6 +225,7 @@ impl<'a> Compiler<'a> {
             radio,
             teams: Arc::default(),
             robots,
+            teams_led,
             has_requests,
             has_delays,
             storage: order,

@@ -14,6 +14,8 @@ pub(super) struct BodyGroup {
     pub(super) ty: GroupTypes,
     pub(super) period: u32,
     pub(super) phase: Option<u32>,
+    /// Whether a planner leads them.
+    pub(super) is_led: bool,
 }
 
 /// One type for all of a group, or one for each body where goals or phases are its own.

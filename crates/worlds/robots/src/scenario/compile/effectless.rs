@@ -260,6 +260,11 @@ fn behaviour_remarks(given: &Given<'_>, k: usize, s: &RobotSection) -> Vec<Remar
         let words = "has no effect: it avoids what sensors report, and the robots have none";
         remarks.push(Remark::warning(format!("{key}.avoidance"), words));
     }
+    if s.planner.is_some() && !s.sensors.is_empty() && !given.file.record.calibration {
+        let words = "no effect on what the robots do: their planner asks no sensor";
+        remarks.push(Remark::note(format!("robots.{k}.sensors"), words));
+        return remarks;
+    }
     let is_blind =
         ["replay", "random"].contains(&kind) || avoidance == Some(AvoidanceSection::Touch);
     if is_blind && !s.sensors.is_empty() && !given.file.record.calibration {

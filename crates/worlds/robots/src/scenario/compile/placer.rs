@@ -3,6 +3,7 @@
 use super::bodies::{BodyGroup, GroupTypes};
 use super::*;
 use crate::scenario::StartPose;
+use crate::team::Team;
 
 /// The part of a scenario on which the places at the start depend: another seed needs nothing else of it.
 #[derive(Debug)]
@@ -30,6 +31,17 @@ impl Placer {
             next += group.count as EntityId;
         }
         first_ids
+    }
+
+    /// Returns the groups of robots that a planner leads.
+    pub(super) fn teams_led(&self) -> Vec<Team> {
+        let mut teams = Vec::new();
+        for (group, first) in self.groups.iter().zip(self.first_ids()) {
+            if group.is_led && group.count > 0 {
+                teams.push(Team { robots: first..first + group.count as EntityId });
+            }
+        }
+        teams
     }
 
     /// Places all bodies, with the draws of `streams`.

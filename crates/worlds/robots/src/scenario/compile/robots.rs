@@ -22,7 +22,10 @@ impl Compiler<'_> {
         let count = self.body_count(s.count.as_ref(), &s.at, &span)?;
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let behaviour = self.behaviour(s.behaviour.as_ref(), size, &body)?;
+        self.check_planner(s, &body.effector)?;
+        let is_led = s.planner.is_some();
+        let robot = RobotKind { size, body: &body, is_led };
+        let behaviour = self.behaviour(s.behaviour.as_ref(), robot)?;
         let actions = Arc::clone(&body.actions);
         let role = Role::Robot(RobotModel::new(body, behaviour));
         let ty = self.body_type(&s.kind, (size, size), actions, role)?;
@@ -35,6 +38,7 @@ impl Compiler<'_> {
             ty,
             period: period_cycles(s.period),
             phase: s.phase,
+            is_led,
         })
     }
 
@@ -56,13 +60,15 @@ impl Compiler<'_> {
         }
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let routes = RoutePlanner::new(&self.map, size, None, &body);
-        let avoidance = self.avoidance(None, &routes, &body);
+        self.check_planner(s, &body.effector)?;
+        let is_led = s.planner.is_some();
+        let routes = RoutePlanner::new(&self.map, size, None, &body, is_led);
+        let alone = (!is_led).then(|| self.avoidance(None, &routes, &body));
         let mut places = Vec::new();
         let mut types = Vec::new();
         for row in &rows[..count] {
             let goals = vec![self.scen_goal(scen, row, &routes)?];
-            let avoidance = avoidance.clone();
+            let avoidance = alone.clone().unwrap_or_else(|| Avoidance::Team(vec![vec![row.goal]]));
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
             let model = RobotModel::new(Arc::clone(&body), behaviour);
             let actions = Arc::clone(&body.actions);
@@ -78,6 +84,7 @@ impl Compiler<'_> {
             ty: GroupTypes::PerBody(types),
             period: period_cycles(s.period),
             phase: s.phase,
+            is_led: s.planner.is_some(),
         })
     }
 
@@ -175,18 +182,18 @@ impl Compiler<'_> {
     fn behaviour(
         &self,
         section: Option<&Spanned<BehaviourSection>>,
-        size: u32,
-        body: &RobotBody,
+        robot: RobotKind<'_>,
     ) -> Result<Arc<dyn Behaviour>, InputError> {
+        let RobotKind { body, is_led, .. } = robot;
         let Some(section) = section else {
             return Ok(self.with_stall_detector(Arc::new(Wander::default()), body));
         };
-        let robot = BehaviourBuilder { compiler: self, section, size, body };
+        let builder = BehaviourBuilder { compiler: self, section, robot };
         let kind = section.get_ref().kind.get_ref().as_str();
-        let behaviour = robot.build(kind)?;
+        let behaviour = builder.build(kind)?;
         // Planners need no contact: they see obstacles, and leave deadlocks by straying.
         let waits_for_contacts =
-            ["wander", "shuttle", "goto"].contains(&kind) && !behaviour.has_requests();
+            ["wander", "shuttle", "goto"].contains(&kind) && !behaviour.has_requests() && !is_led;
         if waits_for_contacts {
             Ok(self.with_stall_detector(behaviour, body))
         } else {
@@ -255,10 +262,11 @@ impl RoutePlanner {
         size: u32,
         avoidance: Option<AvoidanceSection>,
         body: &RobotBody,
+        is_led: bool,
     ) -> Self {
         let free = Arc::new(FreeSpace::from_map(map));
         let is_planned = avoidance.unwrap_or_default() == AvoidanceSection::Plan;
-        let has_lanes = is_planned && !body.sensors.is_empty();
+        let has_lanes = is_planned && !is_led && !body.sensors.is_empty();
         let lanes = has_lanes.then(|| Arc::new(Lanes::new(&free, size)));
         Self { free, size, lanes }
     }
@@ -271,21 +279,29 @@ impl RoutePlanner {
     }
 }
 
+/// The robots of one section, for which a behavior is made.
+#[derive(Clone, Copy)]
+struct RobotKind<'c> {
+    size: u32,
+    body: &'c RobotBody,
+    /// Whether a planner leads them.
+    is_led: bool,
+}
+
 /// The behavior of one section of robots in the making, with the robots that it is for.
 struct BehaviourBuilder<'c, 'a> {
     compiler: &'c Compiler<'a>,
     section: &'c Spanned<BehaviourSection>,
-    size: u32,
-    body: &'c RobotBody,
+    robot: RobotKind<'c>,
 }
 
 impl BehaviourBuilder<'_, '_> {
     fn build(&self, kind: &str) -> Result<Arc<dyn Behaviour>, InputError> {
         let s = self.section.get_ref();
-        let actions = &self.body.effector.actions;
+        let actions = &self.robot.body.effector.actions;
         Ok(match kind {
             "wander" => Arc::new(wander(s)),
-            "announce" => Arc::new(Announce { wander: wander(s), size: self.size }),
+            "announce" => Arc::new(Announce { wander: wander(s), size: self.robot.size }),
             "shuttle" => self.shuttle()?,
             "goto" => self.goto()?,
             "replay" => Arc::new(replay(s, actions).map_err(|error| self.located(error))?),
@@ -305,24 +321,51 @@ impl BehaviourBuilder<'_, '_> {
 
     fn shuttle(&self) -> Result<Arc<dyn Behaviour>, InputError> {
         let s = self.section.get_ref();
-        let routes = RoutePlanner::new(&self.compiler.map, self.size, s.avoidance, self.body);
+        let routes = self.routes();
         let a = self.required("a", s.a, "[col, row, width, height]")?;
         let start = self.flow_field(&routes, a)?;
         let b = self.required("b", s.b, "[col, row, width, height]")?;
         let end = self.flow_field(&routes, b)?;
-        let avoidance = self.compiler.avoidance(s.avoidance, &routes, self.body);
+        let avoidance = self.avoidance(&routes, &[(a, &start), (b, &end)]);
         Ok(Arc::new(Shuttle { ends: [start, end], avoidance }))
     }
 
     fn goto(&self) -> Result<Arc<dyn Behaviour>, InputError> {
         let s = self.section.get_ref();
-        let routes = RoutePlanner::new(&self.compiler.map, self.size, s.avoidance, self.body);
+        let routes = self.routes();
         let mut goals = Vec::new();
-        for &(col, row) in self.required("goals", s.goals.as_ref(), "[[col, row], ...]")? {
+        let boxes = self.required("goals", s.goals.as_ref(), "[[col, row], ...]")?;
+        for &(col, row) in boxes {
             goals.push(self.flow_field(&routes, [col, row, 1, 1])?);
         }
-        let avoidance = self.compiler.avoidance(s.avoidance, &routes, self.body);
+        let regions: Vec<_> =
+            boxes.iter().map(|&(col, row)| [col, row, 1, 1]).zip(&goals).collect();
+        let avoidance = self.avoidance(&routes, &regions);
         Ok(Arc::new(Goto { goals, repeat: s.repeat.unwrap_or(false), avoidance }))
+    }
+
+    fn routes(&self) -> RoutePlanner {
+        let RobotKind { size, body, is_led } = self.robot;
+        let avoidance = self.section.get_ref().avoidance;
+        RoutePlanner::new(&self.compiler.map, size, avoidance, body, is_led)
+    }
+
+    /// Returns the way past obstacles to regions; a planner chooses among those of their boxes where the body fits.
+    fn avoidance(
+        &self,
+        routes: &RoutePlanner,
+        regions: &[([u32; 4], &Arc<FlowField>)],
+    ) -> Avoidance {
+        if !self.robot.is_led {
+            let avoidance = self.section.get_ref().avoidance;
+            return self.compiler.avoidance(avoidance, routes, self.robot.body);
+        }
+        let mut anchors = Vec::with_capacity(regions.len());
+        for &(rect, field) in regions {
+            let fits = |&(col, row): &(u32, u32)| field.is_goal(col, row);
+            anchors.push(boxes_of(rect).filter(fits).collect());
+        }
+        Avoidance::Team(anchors)
     }
 
     /// Returns the value of a key that the behavior cannot do without.
@@ -336,11 +379,9 @@ impl BehaviourBuilder<'_, '_> {
         routes: &RoutePlanner,
         rect: [u32; 4],
     ) -> Result<Arc<FlowField>, InputError> {
-        let size = self.size;
+        let size = self.robot.size;
         self.compiler.check_rect(rect, self.section.span())?;
-        let [col, row, width, height] = rect;
-        let goals: Vec<_> =
-            (row..row + height).flat_map(|r| (col..col + width).map(move |c| (c, r))).collect();
+        let goals: Vec<_> = boxes_of(rect).collect();
         let field = routes.to_nearest(&goals);
         // A box of the region in which a robot does not fit is no goal.
         if goals.iter().any(|&(c, r)| field.is_goal(c, r)) {
@@ -380,6 +421,11 @@ fn replay(s: &BehaviourSection, actions: &[String]) -> Result<Replay, UnlocatedE
     let names = required(s, "actions", s.actions.as_ref(), "[\"forward\", \"left\"]")?;
     let ids = names.iter().map(|name| random::action_id(name, actions).map(|id| id as u8));
     Ok(Replay { actions: ids.collect::<Result<_, _>>()?, repeat: s.repeat.unwrap_or(false) })
+}
+
+/// Returns the boxes of a region, row by row.
+fn boxes_of([col, row, width, height]: [u32; 4]) -> impl Iterator<Item = (u32, u32)> {
+    (row..row + height).flat_map(move |r| (col..col + width).map(move |c| (c, r)))
 }
 
 /// One box unless the scenario says otherwise.
