@@ -155,8 +155,8 @@ impl Behaviour for Goto {
 
     fn planned_goals(&self, at: (u32, u32), memory: &Memory) -> &[(u32, u32)] {
         // A copy, because the robot itself counts its goals when it decides.
-        let memory = &mut memory.clone();
-        self.next_goal(at, memory);
+        let mut memory = *memory;
+        self.next_goal(at, &mut memory);
         let reached = memory.words[GOALS_REACHED_WORD] as usize;
         self.avoidance.anchors(reached.min(self.goals.len().saturating_sub(1)))
     }
@@ -174,8 +174,8 @@ impl Behaviour for Shuttle {
 
     fn planned_goals(&self, at: (u32, u32), memory: &Memory) -> &[(u32, u32)] {
         // A copy, because the robot itself counts its trips when it decides.
-        let (target, _) = self.next_end(at, &mut memory.clone());
-        self.avoidance.anchors(target)
+        let mut memory = *memory;
+        self.avoidance.anchors(self.next_end(at, &mut memory).0)
     }
 
     fn decide(&self, percept: &Percept<'_>, memory: &mut Memory, draws: &mut Draws) -> Decision {
