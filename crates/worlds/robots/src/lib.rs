@@ -7,7 +7,7 @@
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
-//! team.rs: before a cycle, the planners of teams                   world.rs says which robots they lead
+//! plan.rs: before a cycle, the planners of teams (team.rs)
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio
 //! ```
@@ -36,6 +36,7 @@ mod metric_info;
 pub mod metrics;
 mod odometry;
 mod perceive;
+mod plan;
 pub mod policy;
 mod purpose;
 mod ranges;

@@ -184,7 +184,7 @@ impl RobotsState {
             turns: columns(n),
             entered_by: columns(world.walls.len()),
             delays: DelayColumns::new(if world.has_delays { n } else { 0 }),
-            teams_led: TeamState::all(world),
+            teams_led: world.new_team_states(),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
         }

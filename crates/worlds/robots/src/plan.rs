@@ -1,0 +1,189 @@
+//! *Plan*: teams with common knowledge, whose planner chooses the next action of each robot before anybody claims.
+//!
+//! The planner is a part of the environment, and privileged: it knows where all bodies truly stand, and which robots
+//! are delayed. It writes each action into the robot's memory, from where the robot's behavior takes it.
+
+use super::perceive::memory_of;
+use super::state::RobotsState;
+use super::team::{Team, TeamState, WORDS};
+use super::world::{RobotsWorld, Role};
+use super::{decide, purpose};
+use sidestep_kernel::{Cycle, EntityId, Seed};
+use sidestep_map::planning::FreeSpace;
+use sidestep_planners::{Action, GridPose, Obstructions};
+use std::collections::BTreeSet;
+
+/// What a team looks like at the start of a cycle.
+#[derive(Debug, Default)]
+struct TeamSituation {
+    poses: Vec<GridPose>,
+    goals: Vec<Option<(u32, u32)>>,
+    others: Vec<(u32, u32)>,
+    delayed: Vec<u32>,
+}
+
+impl RobotsWorld {
+    /// Returns the state of each team before the first cycle.
+    pub(crate) fn new_team_states(&self) -> Box<[TeamState]> {
+        let free = FreeSpace::from_map(&self.map);
+        let mut states = Vec::with_capacity(self.teams_led.len());
+        for team in &self.teams_led {
+            let sizes: Vec<u32> = team.robots.clone().map(|id| self.type_of(id).size.0).collect();
+            let [high, low, ..] = self.streams.block(team.robots.start, 0, purpose::PLAN, 0);
+            let seed = Seed(u64::from(high) << 32 | u64::from(low));
+            states.push(TeamState::new(&free, &sizes, seed));
+        }
+        states.into()
+    }
+
+    /// Plans for each team whose robots are due.
+    pub(crate) fn plan(&self, state: &RobotsState, now: Cycle) {
+        for (team, led) in self.teams_led.iter().zip(&state.teams_led) {
+            if self.bodies[team.robots.start as usize].is_due(now) {
+                self.plan_team(state, team, led);
+            }
+        }
+    }
+
+    fn plan_team(&self, state: &RobotsState, team: &Team, led: &TeamState) {
+        let (mut planner, mut guard) = led.locked();
+        let memory = &mut *guard;
+        let mut situation = self.situation(state, team);
+        situation.goals = self.choose_goals(state, team, &memory.pibt.goals);
+        memory.compare(&situation.poses);
+        let TeamSituation { poses, goals, others, delayed } = &situation;
+        let obstructions = Obstructions { boxes: others, idle: delayed };
+        let actions = planner.step_among(&mut memory.pibt, poses, goals, obstructions);
+        let actions = actions.expect("goals are boxes where the body fits");
+        for (robot, (id, &action)) in team.robots.clone().zip(actions).enumerate() {
+            memory.planned[robot] = poses[robot].after(action);
+            decide::Avoidance::order(&state.body(id).memory, action_id(action));
+        }
+    }
+
+    /// Returns the poses of a team, which of it are delayed, and the boxes of all other bodies.
+    fn situation(&self, state: &RobotsState, team: &Team) -> TeamSituation {
+        let mut situation = TeamSituation::default();
+        for (slot, body) in state.bodies.iter().enumerate() {
+            let is_open = state.is_open_door(self, slot as u32);
+            if !team.robots.contains(&body.id) && !is_open {
+                let boxes = self.type_of(body.id).boxes(self.map_position(body.position()));
+                let rows = boxes.row..boxes.row + boxes.height;
+                let cols = boxes.col..boxes.col + boxes.width;
+                let all = rows.flat_map(|row| cols.clone().map(move |col| (col, row)));
+                situation.others.extend(all);
+            }
+        }
+        for (robot, id) in (0..).zip(team.robots.clone()) {
+            let body = state.body(id);
+            let (col, row) = self.map_position(body.position());
+            situation.poses.push(GridPose::new(col, row, body.facing.get().heading()));
+            if state.delays.remaining(id) > 0 {
+                situation.delayed.push(robot);
+            }
+        }
+        situation
+    }
+
+    /// Returns the goal of each robot: the one that it had as long as it is a goal of its present trip, else the nearest
+    /// box where its body fits and does not meet the goal of another one; where there is none, just the nearest.
+    fn choose_goals(
+        &self,
+        state: &RobotsState,
+        team: &Team,
+        last: &[Option<(u32, u32)>],
+    ) -> Vec<Option<(u32, u32)>> {
+        let mut taken = BTreeSet::new();
+        let mut goals = vec![None; last.len()];
+        let mut undecided = Vec::new();
+        for (robot, id) in team.robots.clone().enumerate() {
+            let anchors = self.anchors(state, id);
+            match last[robot].filter(|goal| anchors.contains(goal)) {
+                Some(goal) => {
+                    goals[robot] = Some(goal);
+                    taken.insert(goal);
+                }
+                None => undecided.push((robot, id, anchors)),
+            }
+        }
+        for (robot, id, anchors) in undecided {
+            let size = self.type_of(id).size.0;
+            let at = self.map_position(state.body(id).position());
+            let steps = |goal: (u32, u32)| at.0.abs_diff(goal.0) + at.1.abs_diff(goal.1);
+            let is_taken = |goal: (u32, u32)| meets(&taken, goal, size);
+            let nearest = anchors.iter().min_by_key(|&&goal| (is_taken(goal), steps(goal)));
+            goals[robot] = nearest.copied();
+            taken.extend(nearest);
+        }
+        goals
+    }
+
+    /// Returns the boxes to which a robot may go now.
+    fn anchors(&self, state: &RobotsState, id: EntityId) -> &[(u32, u32)] {
+        let Role::Robot(model) = &self.type_of(id).role else { return &[] };
+        let body = state.body(id);
+        let at = self.map_position(body.position());
+        model.behaviour.planned_goals(at, &memory_of(body))
+    }
+
+    /// Returns a robot's place in the list of teams, and within its team; none for one that decides alone.
+    fn place_in_team(&self, id: EntityId) -> Option<(usize, usize)> {
+        let team = self.teams_led.iter().position(|team| team.robots.contains(&id))?;
+        Some((team, (id - self.teams_led[team].robots.start) as usize))
+    }
+
+    /// Returns the number of cycles in which planners were asked before this one.
+    pub(crate) fn plans_before(&self, cycle: Cycle) -> u64 {
+        let firsts = self.teams_led.iter().map(|team| team.robots.start);
+        firsts.map(|id| self.bodies[id as usize].actions_before(cycle)).sum()
+    }
+}
+
+impl RobotsState {
+    /// Returns what the planner of a robot remembers of it, in words; none of a robot that decides alone.
+    pub(crate) fn plan_words(&self, world: &RobotsWorld, id: EntityId) -> Option<[u32; WORDS]> {
+        let (team, robot) = world.place_in_team(id)?;
+        Some(self.teams_led[team].words(robot))
+    }
+
+    /// Takes over what [`Self::plan_words`] returned, before a cycle.
+    pub(crate) fn restore_plan(
+        &self,
+        world: &RobotsWorld,
+        id: EntityId,
+        words: &[u32],
+        cycle: Cycle,
+    ) {
+        let Some((team, robot)) = world.place_in_team(id) else { return };
+        let Ok(words) = words.try_into() else { return };
+        let step = world.bodies[id as usize].actions_before(cycle);
+        self.teams_led[team].restore(robot, words, step);
+    }
+
+    /// Returns how often a robot was elsewhere than planned.
+    pub(crate) fn off_plan(&self, world: &RobotsWorld, id: EntityId) -> u32 {
+        let place = world.place_in_team(id);
+        place.map_or(0, |(team, robot)| self.teams_led[team].off_plan(robot))
+    }
+}
+
+/// Returns whether a body at one place covers a box that one of the same size at another place does.
+fn meets(taken: &BTreeSet<(u32, u32)>, (col, row): (u32, u32), size: u32) -> bool {
+    let reach = size - 1;
+    let rows = row.saturating_sub(reach)..=row + reach;
+    let cols = col.saturating_sub(reach)..=col + reach;
+    taken.iter().any(|(other_col, other_row)| cols.contains(other_col) && rows.contains(other_row))
+}
+
+fn action_id(action: Action) -> decide::ActionId {
+    match action {
+        Action::Forward => super::effector::FORWARD,
+        Action::TurnLeft => super::effector::LEFT,
+        Action::TurnRight => super::effector::RIGHT,
+        // Robots have headings, so no planner of theirs moves them sideways.
+        Action::Wait | Action::Move(_) => super::effector::STAY,
+    }
+}
+
+#[cfg(test)]
+mod tests;
