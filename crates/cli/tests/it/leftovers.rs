@@ -47,7 +47,7 @@ fn what_a_killed_export_left_is_removed_by_the_next_one_to_the_same_place_which_
     assert!(ended.err().contains(&note), "{}", ended.err());
     assert_eq!(
         names(&place.path("film")),
-        ["events.csv", "export.manifest.json", "trajectories.csv"]
+        ["events.csv", "export.manifest.json", "series.csv", "trajectories.csv"]
     );
     assert_eq!(place.run(&["verify", "film"]).code(), 0);
 }

@@ -48,7 +48,7 @@ fn a_run_goes_out_in_every_form() {
     let tables = export(&recorded, &wanted(Format::Csv(None), &place.path("csv")), &NoWatcher);
     let names = |path: &PathBuf| path.file_name().map(|name| name.display().to_string());
     let names: Vec<_> = tables.expect("written").paths.iter().filter_map(names).collect();
-    assert_eq!(names, ["events.csv", "trajectories.csv"]);
+    assert_eq!(names, ["events.csv", "series.csv", "trajectories.csv"]);
 }
 
 #[test]
