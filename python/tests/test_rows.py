@@ -141,7 +141,7 @@ def test_a_table_of_a_folder_is_read_when_it_is_asked_for(external, tmp_path):
     (part,) = (tmp_path / "run/events").glob("*.parquet")
     part.write_bytes(b"no table")
     tables = sidestep.read(tmp_path / "run")
-    assert set(tables) == {"trajectories", "events", "orders"}
+    assert set(tables) == {"trajectories", "events", "orders", "series"}
     assert len(tables["trajectories"]) == 1400
     assert tables["trajectories"] is tables["trajectories"], "it is read once"
     with pytest.raises(sidestep.InputError, match="events"):
