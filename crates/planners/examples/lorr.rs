@@ -44,6 +44,9 @@ fn run(problem: &Problem, seed: Seed, ticks: u64) -> Result<u64, InputError> {
     let config = LifelongConfig { ticks_per_action, ..LifelongConfig::default() };
     let made = Lifelong::new(&free, &problem.starts, &problem.tasks, known, config);
     let (mut lifelong, mut state) = made?;
+    if !lifelong.plans_around_walls() {
+        println!("the steps to all goals do not fit in memory: robots stick behind walls");
+    }
     let streams = Streams::new(seed);
     let mut total_ms = 0.0;
     let mut max_ms = 0.0f64;
@@ -68,22 +71,21 @@ fn run(problem: &Problem, seed: Seed, ticks: u64) -> Result<u64, InputError> {
 /// Draws the delays that begin in a tick.
 fn draw(delays: &Delays, streams: &Streams, state: &LifelongState) -> Vec<(usize, u32)> {
     let mut draws = streams.draws(0, state.tick, EVENTS);
-    let mut unit = || f64::from(draws.next_u32()) / f64::from(u32::MAX);
-    let ready: Vec<usize> =
+    let unit = |word: u32| f64::from(word) / (f64::from(u32::MAX) + 1.0);
+    let mut ready: Vec<usize> =
         (0..state.agents.len()).filter(|&agent| state.agents[agent].delay == 0).collect();
     let mut chosen = Vec::new();
     match delays.events {
-        EventModel::Bernoulli => chosen.extend(ready.iter().filter(|_| unit() < delays.chance)),
+        EventModel::Bernoulli => {
+            chosen.extend(ready.iter().filter(|_| unit(draws.next_u32()) < delays.chance));
+        }
         EventModel::Poisson => {
             let mean = state.agents.len() as f64 * delays.chance;
             // The number of arrivals before the product of uniform numbers falls below e^-mean.
-            let mut product = unit();
+            let mut product = unit(draws.next_u32());
             while product > (-mean).exp() && !ready.is_empty() {
-                let agent = ready[(unit() * (ready.len() - 1) as f64).round() as usize];
-                if !chosen.contains(&agent) {
-                    chosen.push(agent);
-                }
-                product *= unit();
+                chosen.push(ready.swap_remove(draws.uniform_below(ready.len() as u32) as usize));
+                product *= unit(draws.next_u32());
             }
         }
     }

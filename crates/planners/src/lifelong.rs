@@ -51,7 +51,7 @@ pub struct LifelongAgent {
     pub age: u32,
 }
 
-/// All that changes from tick to tick.
+/// All that changes from tick to tick, beside the steps to goals that are known so far ([`Lifelong::resume`]).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LifelongState {
     /// The number of ticks so far.
@@ -165,7 +165,14 @@ impl Lifelong {
         Ok((planner, state))
     }
 
-    /// Goes on from a state that was kept.
+    /// Returns whether the steps to the goals of all agents fit in [`LifelongConfig::max_field_bytes`]. Where they do not,
+    /// agents go straight toward their goals and can stick behind walls.
+    pub fn plans_around_walls(&self) -> bool {
+        self.has_fields
+    }
+
+    /// Goes on from a state that was kept. Steps to goals are not part of it: where they are not all known within
+    /// [`LifelongConfig::work_per_tick`] of the next tick, agents can go other ways than in the run that was kept.
     pub fn resume(&mut self, state: &LifelongState) {
         self.holders.fill(NONE);
         for (index, agent) in state.agents.iter().enumerate() {

@@ -233,10 +233,11 @@ impl Guess {
 fn mentions(error: &InputError, name: &str) -> bool {
     // A remedy of the reader's names the world, and sections may have its name.
     let is_of_the_reader = error.remedy().starts_with("see what");
-    // A name of several words stands in backticks.
+    // A name of several words stands in backticks, and so does one of a letter: `a` is a word of most sentences.
+    let is_word = name.chars().nth(1).is_some();
     error.cause().contains(&format!("`{name}`"))
-        || has_word(error.cause(), name)
-        || (!is_of_the_reader && has_word(error.remedy(), name))
+        || is_word && has_word(error.cause(), name)
+        || is_word && !is_of_the_reader && has_word(error.remedy(), name)
 }
 
 fn has_word(text: &str, word: &str) -> bool {

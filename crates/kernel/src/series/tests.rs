@@ -4,37 +4,37 @@ use super::*;
 use serde_json::json;
 
 #[derive(Serialize)]
-struct Part {
+struct SamplePart {
     lag_m: f64,
     hits: u64,
 }
 
 #[derive(Serialize)]
-struct Whole {
+struct SampleMetrics {
     trips: u64,
     mean: Option<f64>,
     late: Option<u64>,
     sizes: Vec<u64>,
-    given_up: Vec<Part>,
+    given_up: Vec<SamplePart>,
     is_done: bool,
     word: &'static str,
     optimize_cpu_s: f64,
-    part: Option<Part>,
+    part: Option<SamplePart>,
     #[serde(flatten)]
     rest: std::collections::BTreeMap<&'static str, i32>,
 }
 
-fn whole(trips: u64, mean: Option<f64>) -> Whole {
-    Whole {
+fn sample(trips: u64, mean: Option<f64>) -> SampleMetrics {
+    SampleMetrics {
         trips,
         mean,
         late: mean.map(|_| 3),
         sizes: vec![1; trips as usize],
-        given_up: (0..trips).map(|hits| Part { lag_m: 0.5, hits }).collect(),
+        given_up: (0..trips).map(|hits| SamplePart { lag_m: 0.5, hits }).collect(),
         is_done: trips > 1,
         word: "x",
         optimize_cpu_s: 0.1,
-        part: Some(Part { lag_m: f64::INFINITY, hits: trips }),
+        part: Some(SamplePart { lag_m: f64::INFINITY, hits: trips }),
         rest: [("turn", -1)].into(),
     }
 }
@@ -45,13 +45,13 @@ fn words(name: &str) -> &'static str {
 
 #[test]
 fn the_columns_are_the_same_whatever_the_metrics_are_when_recording_starts() {
-    let schema = |metrics: &Whole| {
+    let schema = |metrics: &SampleMetrics| {
         let mut series = MetricSeries::default();
         series.start(SeriesInterval::every_cycles(1), metrics, words);
         series.schema().expect("rows")
     };
-    let early = schema(&whole(0, None));
-    assert_eq!(early, schema(&whole(2, Some(1.5))));
+    let early = schema(&sample(0, None));
+    assert_eq!(early, schema(&sample(2, Some(1.5))));
     let columns: Vec<_> = early.columns.iter().map(|c| (c.name.as_str(), c.ty)).collect();
     use ColumnType::{Bool, F64, I64, U64};
     let expected = [
@@ -72,9 +72,9 @@ fn the_columns_are_the_same_whatever_the_metrics_are_when_recording_starts() {
 #[test]
 fn rows_have_the_metrics_and_the_last_cycle_before_them() {
     let mut series = MetricSeries::default();
-    series.start(SeriesInterval::every_cycles(5), &whole(0, None), words);
-    series.push(5, &whole(2, Some(1.5)));
-    series.push(10, &whole(3, None));
+    series.start(SeriesInterval::every_cycles(5), &sample(0, None), words);
+    series.push(5, &sample(2, Some(1.5)));
+    series.push(10, &sample(3, None));
     let schema = series.schema().expect("rows");
     let block = series.take().expect("rows");
     crate::ports::recorder::check_block(&schema, &block).expect("fits");
@@ -88,7 +88,7 @@ fn rows_have_the_metrics_and_the_last_cycle_before_them() {
 #[test]
 fn without_an_interval_there_is_no_table() {
     let mut series = MetricSeries::default();
-    series.start(SeriesInterval::NONE, &whole(0, None), words);
+    series.start(SeriesInterval::NONE, &sample(0, None), words);
     assert_eq!((series.schema(), series.next_due(0)), (None, None));
 }
 

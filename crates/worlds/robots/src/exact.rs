@@ -54,7 +54,7 @@ pub fn single_robot(compiled: &Compiled) -> Result<SingleRobot, InputError> {
         let remedy = "give one robot: [robots] with count = 1, or --set robots.count=1";
         return Err(InputError::new(source_name(compiled), cause, remedy));
     };
-    if !world.teams_led.is_empty() {
+    if !world.planner_teams.is_empty() {
         let cause =
             "a planner leads the robot, and the states of a chain do not say what that remembers";
         let remedy = "leave out [robots.planner]";

@@ -195,7 +195,7 @@ impl Phases for RobotsWorld {
     }
 
     fn has_plan(&self) -> bool {
-        !self.teams_led.is_empty()
+        !self.planner_teams.is_empty()
     }
 
     fn plan(phase: &mut PhaseContext<'_, Self>) {

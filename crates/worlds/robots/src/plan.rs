@@ -26,8 +26,8 @@ impl RobotsWorld {
     /// Returns the state of each team before the first cycle.
     pub(crate) fn new_team_states(&self) -> Box<[TeamState]> {
         let free = FreeSpace::from_map(&self.map);
-        let mut states = Vec::with_capacity(self.teams_led.len());
-        for team in &self.teams_led {
+        let mut states = Vec::with_capacity(self.planner_teams.len());
+        for team in &self.planner_teams {
             let sizes: Vec<u32> = team.robots.clone().map(|id| self.type_of(id).size.0).collect();
             let [high, low, ..] = self.streams.block(team.robots.start, 0, purpose::PLAN, 0);
             let seed = Seed(u64::from(high) << 32 | u64::from(low));
@@ -38,15 +38,15 @@ impl RobotsWorld {
 
     /// Plans for each team whose robots are due.
     pub(crate) fn plan(&self, state: &RobotsState, now: Cycle) {
-        for (team, led) in self.teams_led.iter().zip(&state.teams_led) {
+        for (team, team_state) in self.planner_teams.iter().zip(&state.planner_teams) {
             if self.bodies[team.robots.start as usize].is_due(now) {
-                self.plan_team(state, team, led);
+                self.plan_team(state, team, team_state);
             }
         }
     }
 
-    fn plan_team(&self, state: &RobotsState, team: &Team, led: &TeamState) {
-        let (mut planner, mut guard) = led.locked();
+    fn plan_team(&self, state: &RobotsState, team: &Team, team_state: &TeamState) {
+        let (mut planner, mut guard) = team_state.locked();
         let memory = &mut *guard;
         let mut situation = self.situation(state, team);
         situation.goals = self.choose_goals(state, team, &memory.pibt.goals);
@@ -128,13 +128,13 @@ impl RobotsWorld {
 
     /// Returns a robot's place in the list of teams, and within its team; none for one that decides alone.
     fn place_in_team(&self, id: EntityId) -> Option<(usize, usize)> {
-        let team = self.teams_led.iter().position(|team| team.robots.contains(&id))?;
-        Some((team, (id - self.teams_led[team].robots.start) as usize))
+        let team = self.planner_teams.iter().position(|team| team.robots.contains(&id))?;
+        Some((team, (id - self.planner_teams[team].robots.start) as usize))
     }
 
     /// Returns the number of cycles in which planners were asked before this one.
     pub(crate) fn plans_before(&self, cycle: Cycle) -> u64 {
-        let firsts = self.teams_led.iter().map(|team| team.robots.start);
+        let firsts = self.planner_teams.iter().map(|team| team.robots.start);
         firsts.map(|id| self.bodies[id as usize].actions_before(cycle)).sum()
     }
 }
@@ -143,7 +143,7 @@ impl RobotsState {
     /// Returns what the planner of a robot remembers of it, in words; none of a robot that decides alone.
     pub(crate) fn plan_words(&self, world: &RobotsWorld, id: EntityId) -> Option<[u32; WORDS]> {
         let (team, robot) = world.place_in_team(id)?;
-        Some(self.teams_led[team].words(robot))
+        Some(self.planner_teams[team].words(robot))
     }
 
     /// Takes over what [`Self::plan_words`] returned, before a cycle.
@@ -157,13 +157,13 @@ impl RobotsState {
         let Some((team, robot)) = world.place_in_team(id) else { return };
         let Ok(words) = words.try_into() else { return };
         let step = world.bodies[id as usize].actions_before(cycle);
-        self.teams_led[team].restore(robot, words, step);
+        self.planner_teams[team].restore(robot, words, step);
     }
 
     /// Returns how often a robot was elsewhere than planned.
     pub(crate) fn off_plan(&self, world: &RobotsWorld, id: EntityId) -> u32 {
         let place = world.place_in_team(id);
-        place.map_or(0, |(team, robot)| self.teams_led[team].off_plan(robot))
+        place.map_or(0, |(team, robot)| self.planner_teams[team].off_plan(robot))
     }
 }
 

@@ -47,7 +47,7 @@ pub struct RobotsState {
     /// Delays of each robot; empty where no robot has any.
     pub(crate) delays: DelayColumns,
     /// The planners of teams.
-    pub(crate) teams_led: Box<[TeamState]>,
+    pub(crate) planner_teams: Box<[TeamState]>,
     /// Last broadcast of each robot; empty without radio.
     pub(crate) voices: BroadcastBuffer,
     /// Poses at the start of each cycle, while a run is recorded.
@@ -184,7 +184,7 @@ impl RobotsState {
             turns: columns(n),
             entered_by: columns(world.walls.len()),
             delays: DelayColumns::new(if world.has_delays { n } else { 0 }),
-            teams_led: world.new_team_states(),
+            planner_teams: world.new_team_states(),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
         }
@@ -204,7 +204,7 @@ impl RobotsState {
             turns: self.turns.clone(),
             entered_by: self.entered_by.clone(),
             delays: self.delays.clone(),
-            teams_led: self.teams_led.iter().map(TeamState::trial_copy).collect(),
+            planner_teams: self.planner_teams.iter().map(TeamState::trial_copy).collect(),
             voices: self.voices.clone(),
             frames: None,
         }

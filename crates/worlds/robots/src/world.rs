@@ -112,7 +112,7 @@ pub struct RobotsWorld {
     pub(super) teams: Arc<AgentTeams>,
     pub(super) robots: Vec<EntityId>,
     /// The teams of robots that a planner leads.
-    pub(super) teams_led: Vec<Team>,
+    pub(super) planner_teams: Vec<Team>,
     /// Whether there are robots that ask each other to make room.
     pub(super) has_requests: bool,
     /// Whether there are robots that may be delayed.

@@ -138,7 +138,7 @@ fn large_bodies_with_a_period_come_to_goals_of_their_own() {
 }
 
 #[test]
-fn an_inspection_changes_nothing_and_shows_the_action_that_is_planned_for_this_cycle() {
+fn an_inspection_of_a_robot_that_is_led_changes_nothing() {
     let mut watched = run(ROOMS, 1);
     let mut unwatched = run(ROOMS, 1);
     for _ in 0..30 {

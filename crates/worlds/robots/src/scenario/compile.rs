@@ -211,7 +211,7 @@ impl<'a> Compiler<'a> {
         let has_requests = self.has_requests();
         let has_delays = self.has_delays();
         let kind_rank = self.kind_rank()?;
-        let teams_led = placer.teams_led();
+        let planner_teams = placer.planner_teams();
         let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
             regime: self.file.regime,
@@ -225,7 +225,7 @@ impl<'a> Compiler<'a> {
             radio,
             teams: Arc::default(),
             robots,
-            teams_led,
+            planner_teams,
             has_requests,
             has_delays,
             storage: order,

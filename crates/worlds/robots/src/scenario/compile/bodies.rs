@@ -15,7 +15,7 @@ pub(super) struct BodyGroup {
     pub(super) period: u32,
     pub(super) phase: Option<u32>,
     /// Whether a planner leads them.
-    pub(super) is_led: bool,
+    pub(super) has_planner: bool,
 }
 
 /// One type for all of a group, or one for each body where goals or phases are its own.

@@ -35,7 +35,7 @@ impl Compiler<'_> {
             ty,
             period: period_cycles(s.period),
             phase: s.phase,
-            is_led: false,
+            has_planner: false,
         })
     }
 
@@ -63,7 +63,7 @@ impl Compiler<'_> {
             ty: GroupTypes::PerBody(types),
             period: 1,
             phase: Some(0),
-            is_led: false,
+            has_planner: false,
         })
     }
 

@@ -34,10 +34,10 @@ impl Placer {
     }
 
     /// Returns the groups of robots that a planner leads.
-    pub(super) fn teams_led(&self) -> Vec<Team> {
+    pub(super) fn planner_teams(&self) -> Vec<Team> {
         let mut teams = Vec::new();
         for (group, first) in self.groups.iter().zip(self.first_ids()) {
-            if group.is_led && group.count > 0 {
+            if group.has_planner && group.count > 0 {
                 teams.push(Team { robots: first..first + group.count as EntityId });
             }
         }

@@ -23,8 +23,8 @@ impl Compiler<'_> {
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
         self.check_planner(s, &body.effector)?;
-        let is_led = s.planner.is_some();
-        let robot = RobotKind { size, body: &body, is_led };
+        let has_planner = s.planner.is_some();
+        let robot = RobotKind { size, body: &body, has_planner };
         let behaviour = self.behaviour(s.behaviour.as_ref(), robot)?;
         let actions = Arc::clone(&body.actions);
         let role = Role::Robot(RobotModel::new(body, behaviour));
@@ -38,7 +38,7 @@ impl Compiler<'_> {
             ty,
             period: period_cycles(s.period),
             phase: s.phase,
-            is_led,
+            has_planner,
         })
     }
 
@@ -61,9 +61,9 @@ impl Compiler<'_> {
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
         self.check_planner(s, &body.effector)?;
-        let is_led = s.planner.is_some();
-        let routes = RoutePlanner::new(&self.map, size, None, &body, is_led);
-        let alone = (!is_led).then(|| self.avoidance(None, &routes, &body));
+        let has_planner = s.planner.is_some();
+        let routes = RoutePlanner::new(&self.map, size, None, &body, has_planner);
+        let alone = (!has_planner).then(|| self.avoidance(None, &routes, &body));
         let mut places = Vec::new();
         let mut types = Vec::new();
         for row in &rows[..count] {
@@ -84,7 +84,7 @@ impl Compiler<'_> {
             ty: GroupTypes::PerBody(types),
             period: period_cycles(s.period),
             phase: s.phase,
-            is_led: s.planner.is_some(),
+            has_planner: s.planner.is_some(),
         })
     }
 
@@ -184,7 +184,7 @@ impl Compiler<'_> {
         section: Option<&Spanned<BehaviourSection>>,
         robot: RobotKind<'_>,
     ) -> Result<Arc<dyn Behaviour>, InputError> {
-        let RobotKind { body, is_led, .. } = robot;
+        let RobotKind { body, has_planner, .. } = robot;
         let Some(section) = section else {
             return Ok(self.with_stall_detector(Arc::new(Wander::default()), body));
         };
@@ -192,8 +192,9 @@ impl Compiler<'_> {
         let kind = section.get_ref().kind.get_ref().as_str();
         let behaviour = builder.build(kind)?;
         // Planners need no contact: they see obstacles, and leave deadlocks by straying.
-        let waits_for_contacts =
-            ["wander", "shuttle", "goto"].contains(&kind) && !behaviour.has_requests() && !is_led;
+        let waits_for_contacts = ["wander", "shuttle", "goto"].contains(&kind)
+            && !behaviour.has_requests()
+            && !has_planner;
         if waits_for_contacts {
             Ok(self.with_stall_detector(behaviour, body))
         } else {
@@ -262,11 +263,11 @@ impl RoutePlanner {
         size: u32,
         avoidance: Option<AvoidanceSection>,
         body: &RobotBody,
-        is_led: bool,
+        has_planner: bool,
     ) -> Self {
         let free = Arc::new(FreeSpace::from_map(map));
         let is_planned = avoidance.unwrap_or_default() == AvoidanceSection::Plan;
-        let has_lanes = is_planned && !is_led && !body.sensors.is_empty();
+        let has_lanes = is_planned && !has_planner && !body.sensors.is_empty();
         let lanes = has_lanes.then(|| Arc::new(Lanes::new(&free, size)));
         Self { free, size, lanes }
     }
@@ -285,7 +286,7 @@ struct RobotKind<'c> {
     size: u32,
     body: &'c RobotBody,
     /// Whether a planner leads them.
-    is_led: bool,
+    has_planner: bool,
 }
 
 /// The behavior of one section of robots in the making, with the robots that it is for.
@@ -345,9 +346,9 @@ impl BehaviourBuilder<'_, '_> {
     }
 
     fn routes(&self) -> RoutePlanner {
-        let RobotKind { size, body, is_led } = self.robot;
+        let RobotKind { size, body, has_planner } = self.robot;
         let avoidance = self.section.get_ref().avoidance;
-        RoutePlanner::new(&self.compiler.map, size, avoidance, body, is_led)
+        RoutePlanner::new(&self.compiler.map, size, avoidance, body, has_planner)
     }
 
     /// Returns the way past obstacles to regions; a planner chooses among those of their boxes where the body fits.
@@ -356,7 +357,7 @@ impl BehaviourBuilder<'_, '_> {
         routes: &RoutePlanner,
         regions: &[([u32; 4], &Arc<FlowField>)],
     ) -> Avoidance {
-        if !self.robot.is_led {
+        if !self.robot.has_planner {
             let avoidance = self.section.get_ref().avoidance;
             return self.compiler.avoidance(avoidance, routes, self.robot.body);
         }
