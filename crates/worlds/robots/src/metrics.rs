@@ -5,7 +5,6 @@ use super::state::{BodyState, RobotsState};
 use super::world::{RobotsWorld, Role};
 use serde::Serialize;
 use sidestep_kernel::{Cycle, EntityId, GroupSizeHistogram, Run};
-use sidestep_map::Cell;
 use sidestep_scenario::metrics;
 use std::collections::BTreeMap;
 
@@ -133,7 +132,7 @@ impl RobotsWorld {
         groups: &GroupSizeHistogram,
     ) -> Metrics {
         let total = self.totals(state, cycle);
-        let free = self.map.count(Cell::Free).max(1);
+        let free = self.free_boxes.max(1);
         // Empty bins at the end are left out.
         let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {

@@ -101,6 +101,8 @@ pub struct RobotsWorld {
     pub obstacle_rule: ObstacleRule,
     /// The order in which the bodies of a conflict group act.
     pub policy: ConflictPolicy,
+    /// Number of free boxes of the map, which each row of metrics over time needs.
+    pub(super) free_boxes: usize,
     /// All bodies by id.
     pub bodies: Vec<Body>,
     /// Properties that bodies have in common, one entry per type.

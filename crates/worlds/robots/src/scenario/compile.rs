@@ -218,6 +218,7 @@ impl<'a> Compiler<'a> {
             obstacle_rule: self.file.obstacle_rule,
             policy: self.file.conflict_policy,
             kinds: self.kinds.names(),
+            free_boxes: self.map.count(Cell::Free),
             map: self.map,
             types: self.types,
             bodies: placed.bodies,
