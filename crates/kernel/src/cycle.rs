@@ -64,6 +64,8 @@ pub struct WorkerStats {
     /// Processor time of the worker's thread, in nanoseconds; where calls are of a single cycle, only some are
     /// measured and stand for all.
     pub cpu_ns: u64,
+    /// Processor time that this worker has planned, in nanoseconds.
+    pub plan_ns: u64,
     /// Calls of a single cycle so far, by which those to measure are chosen.
     single_cycle_calls: u64,
     /// Buffer for the members of a group, kept to allocate none per group.
@@ -356,7 +358,9 @@ impl<W: Phases> CycleSegmentContext<'_, W> {
         if world.has_plan() {
             if leader.is_some() {
                 interrupt::check();
+                let start_ns = clock.thread_cpu_ns();
                 W::plan(context);
+                stats.plan_ns += clock.thread_cpu_ns() - start_ns;
             }
             worker.wait_at_barrier();
         }

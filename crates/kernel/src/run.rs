@@ -122,10 +122,11 @@ impl<W: World> Run<W> {
 
     /// Returns the conflict groups since the start of the run, and the processor time of all workers.
     pub fn stats(&self) -> RunStats {
-        let mut stats = RunStats { groups: self.groups_before, cpu_ns: 0 };
+        let mut stats = RunStats { groups: self.groups_before, cpu_ns: 0, plan_ns: 0 };
         for worker in self.engine.worker_states() {
             stats.groups.merge(&worker.stats.groups);
             stats.cpu_ns += worker.stats.cpu_ns;
+            stats.plan_ns += worker.stats.plan_ns;
         }
         stats
     }

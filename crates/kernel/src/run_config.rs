@@ -43,6 +43,8 @@ pub struct RunStats {
     pub groups: GroupSizeHistogram,
     /// Processor time of all workers, in nanoseconds.
     pub cpu_ns: u64,
+    /// Processor time of the phase *plan*, in nanoseconds.
+    pub plan_ns: u64,
 }
 
 /// Conflict groups by size: a sum over cycles, which checkpoints keep.

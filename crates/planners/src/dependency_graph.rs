@@ -86,6 +86,13 @@ impl DependencyGraph {
         after.iter().map(|&(other, done)| (other as usize, done as usize - 1))
     }
 
+    /// Returns the circle of which an action of an agent is a part, by its number and its agents.
+    pub(crate) fn circle(&self, agent: usize, index: usize) -> Option<(u32, &[u32])> {
+        let number = self.actions[agent].get(index)?.circle;
+        let agents = self.circles.get(number as usize)?;
+        Some((number, agents))
+    }
+
     /// Returns the circles: agents who have to move in one step, since each enters the box of another. Without them the
     /// graph has no cycle.
     pub fn circles(&self) -> &[Vec<u32>] {

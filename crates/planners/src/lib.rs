@@ -6,6 +6,7 @@ pub mod cbs;
 pub mod dependency_graph;
 mod descent;
 mod distances;
+mod executor;
 mod goal_fields;
 mod graph;
 mod inheritance;
@@ -14,17 +15,23 @@ pub mod lacam;
 pub mod lifelong;
 pub mod pibt;
 mod plan;
+pub mod plan_file;
 mod pose;
 pub mod prioritized;
 mod safe_intervals;
 pub mod tasks;
+mod team_planner;
 #[cfg(test)]
 mod tests;
 
 pub use dependency_graph::{DependencyGraph, Permission};
+pub use executor::{Execution, Executor};
 pub use instance::{Agent, Bounds, Instance};
 pub use pibt::{Obstructions, Pibt, PibtConfig, PibtState};
 pub use plan::{Costs, Plan, PlanError};
 pub use pose::{Action, ActionModel, GridPose};
 pub use sidestep_kernel::{InputError, Seed};
 pub use sidestep_map::planning::FreeSpace;
+pub use team_planner::{
+    Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState, TeamStep,
+};

@@ -84,6 +84,13 @@ impl GridPose {
         }
     }
 
+    /// Returns the number of boxes and quarter turns to another pose, walls aside.
+    #[must_use]
+    pub fn steps_off(self, other: Self) -> u32 {
+        let boxes = self.col.abs_diff(other.col) + self.row.abs_diff(other.row);
+        boxes + u32::from(quarter_turns(self.heading % 4, other.heading % 4))
+    }
+
     fn neighbor(self, direction: u8) -> Option<Self> {
         let (east, north) = STEPS[usize::from(direction % 4)];
         let col = self.col.checked_add_signed(east)?;

@@ -7,3 +7,4 @@ mod joint_search;
 mod lacam;
 mod pibt;
 mod prioritized;
+mod team_planner;

@@ -9,7 +9,7 @@ use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 
 /// Metrics that a clock has measured.
-const CLOCK_METRICS: [&str; 2] = ["optimize_cpu_s", "steps_per_cpu_s"];
+const CLOCK_METRICS: [&str; 3] = ["optimize_cpu_s", "plan_cpu_s", "steps_per_cpu_s"];
 
 fn start(source: &Source, workers: usize) -> Box<dyn Simulation> {
     let compiled = WORLDS.compile(source).unwrap_or_else(|e| panic!("{e}"));

@@ -25,7 +25,7 @@ use super::state::{RobotsState, Snapshot};
 use super::world::RobotsWorld;
 use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::workers::{self, Worker};
-use sidestep_kernel::{Cycle, EntityId, EntitySlot, GroupSizeHistogram};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, RunStats};
 use sidestep_map::Cell;
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -116,7 +116,7 @@ impl BaselineRun {
 
     /// Returns the metrics so far; there are no conflict groups.
     pub fn metrics(&self) -> Metrics {
-        self.compiled.world.metrics(&self.state, self.cycle, &GroupSizeHistogram::default())
+        self.compiled.world.metrics(&self.state, self.cycle, &RunStats::default())
     }
 
     /// Returns the share of the bodies' cycles that one worker did while all others waited.

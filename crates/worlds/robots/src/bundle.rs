@@ -1,7 +1,7 @@
 //! A robots scenario that needs no other file, as a run folder keeps it.
 //!
 //! The map goes along as the program saw it, one pixel per box, so that a later version of
-//! an importer cannot change the replayed map. Profiles and lists of starts are kept as they are.
+//! an importer cannot change the replayed map. Profiles, lists of starts and plans are kept as they are.
 
 use super::scenario::Compiled;
 use serde_json::Value;
@@ -29,7 +29,7 @@ pub(crate) fn resolve(
         }
     }
     add_profiles(&mut bundle, &file["profiles"])?;
-    add_starts(&mut bundle, &file["robots"])?;
+    add_robot_files(&mut bundle, &file["robots"])?;
     bundle.finish()
 }
 
@@ -54,28 +54,34 @@ fn add_profiles(bundle: &mut Bundle<'_>, profiles: &Value) -> Result<(), InputEr
     Ok(())
 }
 
-/// Adds the lists of starts: of many sections `[[robots]]`, or of one `[robots]`.
-fn add_starts(bundle: &mut Bundle<'_>, robots: &Value) -> Result<(), InputError> {
+/// Adds the lists of starts and the plans: of many sections `[[robots]]`, or of one `[robots]`.
+fn add_robot_files(bundle: &mut Bundle<'_>, robots: &Value) -> Result<(), InputError> {
     match robots {
         Value::Array(sections) => {
             for (k, section) in sections.iter().enumerate() {
-                add_start_list(bundle, &format!("robots.{k}.scen"), k, section)?;
+                add_section_files(bundle, &format!("robots.{k}"), k, section)?;
             }
             Ok(())
         }
-        one => add_start_list(bundle, "robots.scen", 0, one),
+        one => add_section_files(bundle, "robots", 0, one),
     }
 }
 
-fn add_start_list(
+fn add_section_files(
     bundle: &mut Bundle<'_>,
-    key: &str,
+    section_key: &str,
     number: usize,
     section: &Value,
 ) -> Result<(), InputError> {
-    if let Some(path) = section["scen"].as_str() {
-        let path = bundle.copy(&format!("starts-{number}.scen"), path)?;
-        bundle.set(key, format_args!("{path:?}"));
+    let files = [
+        ("scen", section["scen"].as_str(), format!("starts-{number}.scen")),
+        ("planner.file", section["planner"]["file"].as_str(), format!("plan-{number}.plan")),
+    ];
+    for (key, path, name) in files {
+        if let Some(path) = path {
+            let path = bundle.copy(&name, path)?;
+            bundle.set(&format!("{section_key}.{key}"), format_args!("{path:?}"));
+        }
     }
     Ok(())
 }

@@ -47,6 +47,7 @@ mod simultaneous;
 pub mod state;
 mod table_notes;
 mod team;
+mod team_words;
 mod text;
 mod view;
 pub mod world;

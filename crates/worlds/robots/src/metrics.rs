@@ -4,7 +4,7 @@ use super::perceive::memory_of;
 use super::state::{BodyState, RobotsState};
 use super::world::{RobotsWorld, Role};
 use serde::Serialize;
-use sidestep_kernel::{Cycle, EntityId, GroupSizeHistogram, Run};
+use sidestep_kernel::{Cycle, EntityId, Run, RunStats};
 use sidestep_scenario::metrics;
 use std::collections::BTreeMap;
 
@@ -42,8 +42,18 @@ metrics! {
         /// Sums over all robots.
         #[serde(flatten)]
         pub total: Counters,
-        /// Calls of planners, one for each team and cycle in which it acts; 0 without `[robots.planner]`.
-        pub plans: u64 => "calls of planners",
+        /// Plans that planners have searched: those of `pibt` one for each team and cycle in which it acts; 0 without
+        /// `[robots.planner]`.
+        pub plans: u64 => "searches of planners",
+        /// Searches that gave no plan, after which priority inheritance led the team for some steps; 0 without
+        /// `[robots.planner]`.
+        pub plan_failures: u64 => "searches without a plan",
+        /// Expansions of all searches, and orders of `prioritized`; 0 of `pibt`, which searches nothing.
+        pub plan_expansions: u64 => "expansions of planners",
+        /// Costs of all plans above the sum of shortest paths with turns, of which 0.1 is 10 %; none without plans.
+        pub plan_cost_gap: Option<f64> => "cost of plans above the lower bound",
+        /// Processor time of all planners. It differs from run to run, and nothing depends on it.
+        pub plan_cpu_s: f64 => "time spent planning",
         /// Share of the free boxes that a robot has covered, 0 to 1. Boxes that robots stand in at the start count.
         pub coverage: f64 => "share of the floor covered",
         /// Share of actions that ended in a contact, 0 to 1.
@@ -124,20 +134,22 @@ impl RobotsWorld {
         total
     }
 
-    /// Returns the metrics of a run, with its conflict groups.
-    pub fn metrics(
-        &self,
-        state: &RobotsState,
-        cycle: Cycle,
-        groups: &GroupSizeHistogram,
-    ) -> Metrics {
+    /// Returns the metrics of a run, with what the kernel measured of it.
+    pub fn metrics(&self, state: &RobotsState, cycle: Cycle, stats: &RunStats) -> Metrics {
+        let groups = &stats.groups;
         let total = self.totals(state, cycle);
+        let plans = state.plan_counts();
         let free = self.free_boxes.max(1);
         // Empty bins at the end are left out.
         let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {
             coverage: (self.boxes_covered_at_start() + total.first_visits) as f64 / free as f64,
-            plans: self.plans_before(cycle),
+            plans: plans.plans,
+            plan_failures: plans.failures,
+            plan_expansions: plans.expansions,
+            plan_cost_gap: (plans.bounds > 0)
+                .then(|| plans.costs as f64 / plans.bounds as f64 - 1.0),
+            plan_cpu_s: stats.plan_ns as f64 / 1e9,
             contacts_per_action: total.contacts as f64 / total.actions.max(1) as f64,
             group_sizes: groups.counts[..used].to_vec(),
             largest_group: groups.largest,

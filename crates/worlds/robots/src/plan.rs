@@ -4,13 +4,14 @@
 //! are delayed. It writes each action into the robot's memory, from where the robot's behavior takes it.
 
 use super::perceive::memory_of;
+use super::state::BodyRecord;
 use super::state::RobotsState;
-use super::team::{Team, TeamState, WORDS};
+use super::team::{Team, TeamState};
 use super::world::{RobotsWorld, Role};
 use super::{decide, purpose};
 use sidestep_kernel::{Cycle, EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
-use sidestep_planners::{Action, GridPose, Obstructions};
+use sidestep_planners::{Action, GridPose, Obstructions, PlanCounts, TeamStep};
 use std::collections::BTreeSet;
 
 /// What a team looks like at the start of a cycle.
@@ -31,7 +32,7 @@ impl RobotsWorld {
             let sizes: Vec<u32> = team.robots.clone().map(|id| self.type_of(id).size.0).collect();
             let [high, low, ..] = self.streams.block(team.robots.start, 0, purpose::PLAN, 0);
             let seed = Seed(u64::from(high) << 32 | u64::from(low));
-            states.push(TeamState::new(&free, &sizes, seed));
+            states.push(TeamState::new(&free, &sizes, team, seed));
         }
         states.into()
     }
@@ -49,11 +50,12 @@ impl RobotsWorld {
         let (mut planner, mut guard) = team_state.locked();
         let memory = &mut *guard;
         let mut situation = self.situation(state, team);
-        situation.goals = self.choose_goals(state, team, &memory.pibt.goals);
+        situation.goals = self.choose_goals(state, team, &memory.planner.pibt.goals);
         memory.compare(&situation.poses);
         let TeamSituation { poses, goals, others, delayed } = &situation;
         let obstructions = Obstructions { boxes: others, idle: delayed };
-        let actions = planner.step_among(&mut memory.pibt, poses, goals, obstructions);
+        let now = TeamStep { poses, goals, obstructions };
+        let actions = planner.step(&mut memory.planner, now);
         let actions = actions.expect("goals are boxes where the body fits");
         for (robot, (id, &action)) in team.robots.clone().zip(actions).enumerate() {
             memory.planned[robot] = poses[robot].after(action);
@@ -131,33 +133,36 @@ impl RobotsWorld {
         let team = self.planner_teams.iter().position(|team| team.robots.contains(&id))?;
         Some((team, (id - self.planner_teams[team].robots.start) as usize))
     }
-
-    /// Returns the number of cycles in which planners were asked before this one.
-    pub(crate) fn plans_before(&self, cycle: Cycle) -> u64 {
-        let firsts = self.planner_teams.iter().map(|team| team.robots.start);
-        firsts.map(|id| self.bodies[id as usize].actions_before(cycle)).sum()
-    }
 }
 
 impl RobotsState {
     /// Returns what the planner of a robot remembers of it, in words; none of a robot that decides alone.
-    pub(crate) fn plan_words(&self, world: &RobotsWorld, id: EntityId) -> Option<[u32; WORDS]> {
-        let (team, robot) = world.place_in_team(id)?;
-        Some(self.planner_teams[team].words(robot))
+    pub(crate) fn plan_words(&self, world: &RobotsWorld, id: EntityId) -> Vec<u32> {
+        let place = world.place_in_team(id);
+        place.map_or(Vec::new(), |(team, robot)| self.planner_teams[team].words(robot))
     }
 
-    /// Takes over what [`Self::plan_words`] returned, before a cycle.
-    pub(crate) fn restore_plan(
-        &self,
-        world: &RobotsWorld,
-        id: EntityId,
-        words: &[u32],
-        cycle: Cycle,
-    ) {
-        let Some((team, robot)) = world.place_in_team(id) else { return };
-        let Ok(words) = words.try_into() else { return };
-        let step = world.bodies[id as usize].actions_before(cycle);
-        self.planner_teams[team].restore(robot, words, step);
+    /// Takes over what [`Self::plan_words`] returned for each robot, before a cycle: it is the end of its record.
+    pub(crate) fn restore_plans(&self, world: &RobotsWorld, records: &[BodyRecord], cycle: Cycle) {
+        for (team, team_state) in world.planner_teams.iter().zip(&self.planner_teams) {
+            let mut shares = Vec::new();
+            for id in team.robots.clone() {
+                let words_before = world.kinds.len() + self.delays.words(id).count();
+                let words = &records[id as usize].contacts;
+                shares.push(words.get(words_before..).unwrap_or_default());
+            }
+            let step = world.bodies[team.robots.start as usize].actions_before(cycle);
+            team_state.restore(&shares, step);
+        }
+    }
+
+    /// Returns what became of the plans of all teams so far.
+    pub(crate) fn plan_counts(&self) -> PlanCounts {
+        let mut total = PlanCounts::default();
+        for team in &self.planner_teams {
+            total += team.counts();
+        }
+        total
     }
 
     /// Returns how often a robot was elsewhere than planned.

@@ -29,7 +29,9 @@ use sidestep_scenario::{
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use values::{BoxSide, DelayCycles, PathSteps, Period, QuarterTurns, SideBoxes, StartPose};
+use values::{
+    BoxSide, Budget, DelayCycles, PathSteps, Period, QuarterTurns, SideBoxes, StartPose, Steps,
+};
 
 /// A whole robots scenario. Every key is described in `scenarios/robots/default.toml`.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -304,6 +306,18 @@ pub(super) struct RobotSection {
 pub(super) struct PlannerSection {
     /// The algorithm.
     pub(super) method: PlannerMethod,
+    /// How a plan is carried out.
+    pub(super) executor: Option<Spanned<PlanExecutor>>,
+    /// Actions for which a plan is used, whatever becomes of goals meanwhile.
+    pub(super) window: Option<Spanned<Steps>>,
+    /// Actions for which a plan is used by `replan`.
+    pub(super) replan_every: Option<Spanned<Steps>>,
+    /// Boxes and quarter turns by which a robot may be off its plan by `replan`.
+    pub(super) max_deviation: Option<Spanned<u32>>,
+    /// Most expansions of a search.
+    pub(super) budget_expansions: Option<Spanned<Budget>>,
+    /// The plan of `file`.
+    pub(super) file: Option<Spanned<PathBuf>>,
 }
 
 /// An algorithm of multi-agent path finding.
@@ -312,6 +326,26 @@ pub(super) struct PlannerSection {
 pub(super) enum PlannerMethod {
     /// Priority inheritance with backtracking: plans one step in each cycle.
     Pibt,
+    /// LaCAM*: a first plan at once, then better ones within a budget.
+    Lacam,
+    /// Prioritized planning with safe intervals: one robot after the other.
+    Prioritized,
+    /// Conflict-based search: the lowest sum of costs.
+    Cbs,
+    /// A plan that was made elsewhere.
+    File,
+}
+
+/// How a plan is carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum PlanExecutor {
+    /// By the clock, whatever comes of it.
+    Blind,
+    /// In the order in which the plan's robots pass each box: an action dependency graph.
+    Adg,
+    /// By the clock, and anew when a robot is off its plan.
+    Replan,
 }
 
 #[derive(Debug, Clone, Deserialize, JsonSchema)]

@@ -281,7 +281,7 @@ impl RobotsState {
             contacts: (0..kinds)
                 .map(|kind| self.contacts.get(first_contact + kind))
                 .chain(self.delays.words(body.id))
-                .chain(self.plan_words(world, body.id).into_iter().flatten())
+                .chain(self.plan_words(world, body.id))
                 .collect(),
         }
     }
@@ -306,11 +306,8 @@ impl RobotsState {
         }
         for (record, &slot) in snapshot.bodies.iter().zip(&state.slot_of_id) {
             state.restore_body(world, slot, record);
-            let body = &state.bodies[slot as usize];
-            let words_before = world.kinds.len() + state.delays.words(body.id).count();
-            let words = record.contacts.get(words_before..).unwrap_or_default();
-            state.restore_plan(world, body.id, words, snapshot.cycle);
         }
+        state.restore_plans(world, &snapshot.bodies, snapshot.cycle);
         state
     }
 

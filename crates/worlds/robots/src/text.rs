@@ -21,11 +21,31 @@ pub(super) fn summary_lines(metrics: &Metrics) -> KeyValues {
         key_value_pair("distance", distance(total.distance_m)),
         key_value_pair("coverage", format!("{:.1} % of the free boxes", 100.0 * metrics.coverage)),
     ];
+    if metrics.plans > 0 {
+        lines.push(key_value_pair("plans", plans(metrics)));
+    }
     // Nothing to report where no two bodies ever met.
     if metrics.largest_group > 0 {
         lines.push(key_value_pair("conflict groups", groups(metrics)));
     }
     lines
+}
+
+/// Returns what became of plans. The time is that of a search: it differs from run to run.
+fn plans(metrics: &Metrics) -> String {
+    let count = group_thousands(metrics.plans);
+    let each_ms = 1e3 * metrics.plan_cpu_s / metrics.plans as f64;
+    let failures = match metrics.plan_failures {
+        0 => String::new(),
+        n => format!(", {} of them without a plan", group_thousands(n)),
+    };
+    let gap = metrics
+        .plan_cost_gap
+        .map_or(String::new(), |gap| format!(", {:.1} % above shortest paths", 100.0 * gap));
+    format!(
+        "{count} of {each_ms:.2} ms each{failures}{gap}; robots off them {} times",
+        group_thousands(metrics.total.off_plan)
+    )
 }
 
 fn distance(meters: f64) -> String {

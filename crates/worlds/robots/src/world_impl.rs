@@ -217,7 +217,7 @@ impl WorldMetrics for RobotsWorld {
     type Metrics = Metrics;
 
     fn metrics(&self, state: &RobotsState, _: &Collector, now: Cycle, stats: &RunStats) -> Metrics {
-        RobotsWorld::metrics(self, state, now, &stats.groups)
+        RobotsWorld::metrics(self, state, now, stats)
     }
 
     fn metric_meaning(&self, name: &str) -> &'static str {

@@ -14,6 +14,11 @@ pub(crate) type DelayCycles = Integer<1, { MAX_DELAY_CYCLES as u64 }>;
 /// Cycles from one action to the next.
 pub(crate) type Period = Integer<1, { u32::MAX as u64 }>;
 
+/// Actions of a plan.
+pub(crate) type Steps = Integer<1, { u32::MAX as u64 }>;
+/// Expansions of a search: each takes some microseconds and some hundred bytes a robot.
+pub(crate) type Budget = Integer<1, 1_000_000_000>;
+
 /// Length of a box's side in meters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoxSide;

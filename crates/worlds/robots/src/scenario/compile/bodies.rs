@@ -2,6 +2,7 @@
 
 use super::super::{Period, SideBoxes, StartPose};
 use super::*;
+use sidestep_planners::TeamPlannerConfig;
 
 /// Bodies that a scenario describes together.
 #[derive(Debug)]
@@ -14,8 +15,8 @@ pub(super) struct BodyGroup {
     pub(super) ty: GroupTypes,
     pub(super) period: u32,
     pub(super) phase: Option<u32>,
-    /// Whether a planner leads them.
-    pub(super) has_planner: bool,
+    /// How a planner leads them, if one does.
+    pub(super) planner: Option<TeamPlannerConfig>,
 }
 
 /// One type for all of a group, or one for each body where goals or phases are its own.

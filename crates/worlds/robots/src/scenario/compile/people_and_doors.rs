@@ -35,7 +35,7 @@ impl Compiler<'_> {
             ty,
             period: period_cycles(s.period),
             phase: s.phase,
-            has_planner: false,
+            planner: None,
         })
     }
 
@@ -63,7 +63,7 @@ impl Compiler<'_> {
             ty: GroupTypes::PerBody(types),
             period: 1,
             phase: Some(0),
-            has_planner: false,
+            planner: None,
         })
     }
 

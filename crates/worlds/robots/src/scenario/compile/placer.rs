@@ -37,9 +37,9 @@ impl Placer {
     pub(super) fn planner_teams(&self) -> Vec<Team> {
         let mut teams = Vec::new();
         for (group, first) in self.groups.iter().zip(self.first_ids()) {
-            if group.has_planner && group.count > 0 {
-                teams.push(Team { robots: first..first + group.count as EntityId });
-            }
+            let config = group.planner.clone().filter(|_| group.count > 0);
+            let robots = first..first + group.count as EntityId;
+            teams.extend(config.map(|config| Team { robots, config }));
         }
         teams
     }

@@ -1,9 +1,14 @@
-//! Teams that a planner leads: what their robots must be like.
+//! Teams that a planner leads: what their robots must be like, and how they are led.
 
-use super::super::{PlannerMethod, RobotSection};
-use super::bodies::period_cycles;
+use super::super::{PlanExecutor, PlannerMethod, PlannerSection, RobotSection, StartPose};
+use super::bodies::{BodyGroup, period_cycles};
+use super::robots::side_boxes;
 use super::*;
 use crate::effector::{LEFT, RIGHT, STANDARD_ACTIONS, STAY, Side};
+use sidestep_kernel::Seed;
+use sidestep_planners::{Executor, Method, TeamPlannerConfig, plan_file};
+use sidestep_scenario::file::read_text;
+use std::path::PathBuf;
 
 /// Behaviors that have goals, which is all that a planner asks of them.
 const WITH_GOALS: [&str; 2] = ["shuttle", "goto"];
@@ -13,21 +18,182 @@ const WITH_GOALS: [&str; 2] = ["shuttle", "goto"];
 const PLANNED_TRANSITIONS: [(ActionId, &[Side], u8); 4] =
     [(FORWARD, &[Side::Front], 0), (LEFT, &[], 1), (RIGHT, &[], 3), (STAY, &[], 0)];
 
+/// Expansions of a search without `budget_expansions`: of 30 robots in a hall, which plan anew at each arrival, they take
+/// some ten milliseconds.
+const DEFAULT_BUDGET: u64 = 300;
+
+/// Orders of the robots that prioritized planning tries: most problems that it solves at all take one to three.
+const MAX_ORDERS: u32 = 10;
+
+/// Actions for which `replan` uses a plan unless the scenario says otherwise: about the way through a room.
+const DEFAULT_REPLAN_EVERY: u32 = 20;
+
+/// Most bytes of a plan: 10,000 robots with 10,000 actions each.
+const MAX_PLAN_BYTES: u64 = 100 << 20;
+
 impl Compiler<'_> {
-    /// Refuses a planner of robots that it cannot lead.
-    pub(super) fn check_planner(
+    /// Returns how a planner leads the robots of a section, and refuses those that it cannot lead.
+    pub(super) fn planner(
         &self,
         s: &RobotSection,
         effector: &EffectorModel,
-    ) -> Result<(), InputError> {
-        let Some(planner) = &s.planner else { return Ok(()) };
-        let PlannerMethod::Pibt = planner.get_ref().method;
+    ) -> Result<Option<TeamPlannerConfig>, InputError> {
+        let Some(planner) = &s.planner else { return Ok(None) };
         let span = planner.span();
+        let planner = planner.get_ref();
+        self.check_planned_robots(s, effector, &span)?;
+        self.check_planner_keys(planner)?;
+        Ok(Some(TeamPlannerConfig {
+            method: self.planner_method(planner, &span)?,
+            executor: executor(planner),
+            window: planner.window.as_ref().map(|window| window.get_ref().get() as u32),
+            may_follow: self.file.conflict_policy == ConflictPolicy::Simultaneous,
+            seed: Seed(0),
+        }))
+    }
+
+    fn planner_method(
+        &self,
+        planner: &PlannerSection,
+        span: &Range<usize>,
+    ) -> Result<Method, InputError> {
+        let budget = planner.budget_expansions.as_ref();
+        let budget_expansions = budget.map_or(DEFAULT_BUDGET, |budget| budget.get_ref().get());
+        match planner.method {
+            PlannerMethod::Pibt => Ok(Method::Pibt),
+            PlannerMethod::Lacam => Ok(Method::Lacam { budget_expansions }),
+            PlannerMethod::Prioritized => Ok(Method::Prioritized { max_orders: MAX_ORDERS }),
+            PlannerMethod::Cbs => Ok(Method::Cbs { budget_expansions }),
+            PlannerMethod::File => {
+                let Some(file) = &planner.file else {
+                    let remedy = "add file = \"NAME.plan\", with a line for each robot: column, row, heading, actions";
+                    return Err(self.source.error(span.clone(), "`file` has no plan", remedy));
+                };
+                let plan = self.plan_file(file)?.plan;
+                Ok(Method::Given(Arc::new(plan)))
+            }
+        }
+    }
+
+    /// Refuses keys that do nothing beside the method or the executor.
+    fn check_planner_keys(&self, planner: &PlannerSection) -> Result<(), InputError> {
+        let method = planner.method;
+        let executor = planner.executor.as_ref().map(|executor| *executor.get_ref());
+        let is_stepwise = method == PlannerMethod::Pibt;
+        let is_given = method == PlannerMethod::File;
+        let has_budget = matches!(method, PlannerMethod::Lacam | PlannerMethod::Cbs);
+        let is_replan = executor == Some(PlanExecutor::Replan);
+        let executor_span = planner.executor.as_ref().map(Spanned::span);
+        let window_span = planner.window.as_ref().map(Spanned::span);
+        let every_span = planner.replan_every.as_ref().map(Spanned::span);
+        let deviation_span = planner.max_deviation.as_ref().map(Spanned::span);
+        let budget_span = planner.budget_expansions.as_ref().map(Spanned::span);
+        let file_span = planner.file.as_ref().map(Spanned::span);
+        let faults = [
+            (
+                executor_span.clone().filter(|_| is_stepwise),
+                "`pibt` plans anew in each cycle, so it has no executor",
+                "leave out `executor`, or give method = \"lacam\"",
+            ),
+            (
+                executor_span.filter(|_| is_given && is_replan),
+                "a plan from a file cannot be made anew",
+                "give executor = \"adg\" or \"blind\"",
+            ),
+            (
+                window_span.filter(|_| is_stepwise || is_given),
+                "`window` has no effect: only `lacam`, `prioritized` and `cbs` plan in windows",
+                "leave out `window`",
+            ),
+            (
+                every_span.filter(|_| !is_replan),
+                "`replan_every` has no effect without executor = \"replan\"",
+                "leave it out, or add executor = \"replan\"",
+            ),
+            (
+                deviation_span.filter(|_| !is_replan),
+                "`max_deviation` has no effect without executor = \"replan\"",
+                "leave it out, or add executor = \"replan\"",
+            ),
+            (
+                budget_span.filter(|_| !has_budget),
+                "`budget_expansions` has no effect: only `lacam` and `cbs` have a budget",
+                "leave it out, or give method = \"lacam\"",
+            ),
+            (
+                file_span.filter(|_| !is_given),
+                "`file` has no effect without method = \"file\"",
+                "leave it out, or give method = \"file\"",
+            ),
+        ];
+        for (span, cause, remedy) in faults {
+            if let Some(span) = span {
+                return Err(self.source.error(span, cause, remedy));
+            }
+        }
+        Ok(())
+    }
+
+    fn plan_file(&self, file: &Spanned<PathBuf>) -> Result<plan_file::PlanFile, InputError> {
+        let path = self.source.path(file.get_ref());
+        let place = path.display().to_string();
+        let text = read_text(&path, MAX_PLAN_BYTES)
+            .map_err(|e| self.source.with_key_at(file.span(), e))?;
+        let plan = plan_file::read(&place, &text);
+        plan.map_err(|error| self.source.with_key_at(file.span(), error))
+    }
+
+    /// Lets the robots of a plan from a file start as that says: where places or headings are given, they have to be the
+    /// same.
+    pub(super) fn start_as_planned(
+        &self,
+        s: &RobotSection,
+        mut group: BodyGroup,
+    ) -> Result<BodyGroup, InputError> {
+        let file = s.planner.as_ref().and_then(|planner| planner.get_ref().file.as_ref());
+        let Some(file) = file else { return Ok(group) };
+        let plan_file = self.plan_file(file)?;
+        let place = self.source.path(file.get_ref()).display().to_string();
+        let at_key = |error: InputError| self.source.with_key_at(file.span(), error);
+        let size = side_boxes(s);
+        let sizes = vec![size; group.count as usize];
+        plan_file.check(&place, &FreeSpace::from_map(&self.map), &sizes).map_err(at_key)?;
+        let mut places = Vec::with_capacity(sizes.len());
+        for (robot, &line) in plan_file.lines.iter().enumerate() {
+            let start = plan_file.plan.pose(robot, 0);
+            let given = group.places.get(robot).map(|place| *place.get_ref());
+            let is_other = given.is_some_and(|given| {
+                given.at != start.position() || given.facing.is_some_and(|f| f != start.heading)
+            });
+            if is_other {
+                let (col, row) = given.map_or((0, 0), |given| given.at);
+                let cause = format!(
+                    "robot {robot} of the section starts at column {col}, row {row}, and its plan elsewhere or with \
+                     another heading"
+                );
+                let remedy = "give a plan from there, or leave out the robots' places: then they start as planned";
+                return Err(at_key(InputError::new(&place, cause, remedy).with_position(line, 1)));
+            }
+            let pose = StartPose { at: start.position(), facing: Some(start.heading) };
+            let span = group.places.get(robot).map_or(file.span(), Spanned::span);
+            places.push(Spanned::new(span, pose));
+        }
+        group.places = places;
+        Ok(group)
+    }
+
+    /// Refuses robots that no planner can lead.
+    fn check_planned_robots(
+        &self,
+        s: &RobotSection,
+        effector: &EffectorModel,
+        span: &Range<usize>,
+    ) -> Result<(), InputError> {
         self.check_planned_behaviour(s, span.clone())?;
         if period_cycles(s.period) > 1 && s.phase.is_none() {
             let cause = "the planner leads robots whose period starts in cycles that are drawn";
             let remedy = "add phase = 0, because a team acts in the same cycles";
-            return Err(self.source.error(span, cause, remedy));
+            return Err(self.source.error(span.clone(), cause, remedy));
         }
         for (action, path, turn) in PLANNED_TRANSITIONS {
             let action = usize::from(action);
@@ -40,7 +206,7 @@ impl Compiler<'_> {
                 );
                 let remedy = "give an effector like forward = [{ p = 0.9, path = \"F\" }, { p = 0.1 }], whose first \
                               transitions are forward one box, left and right 90 degrees, and stay nothing";
-                return Err(self.source.error(span, cause, remedy));
+                return Err(self.source.error(span.clone(), cause, remedy));
             }
         }
         Ok(())
@@ -70,6 +236,24 @@ impl Compiler<'_> {
             return Err(self.source.error(span, cause, "leave out `avoidance`, or the planner"));
         }
         Ok(())
+    }
+}
+
+/// Returns how plans are carried out; of `pibt`, which has none, it means nothing.
+fn executor(planner: &PlannerSection) -> Executor {
+    let name = planner.executor.as_ref().map_or(PlanExecutor::Adg, |executor| *executor.get_ref());
+    match name {
+        PlanExecutor::Blind => Executor::Blind,
+        PlanExecutor::Adg => Executor::Adg,
+        PlanExecutor::Replan => {
+            let every = planner.replan_every.as_ref();
+            let deviation = planner.max_deviation.as_ref();
+            Executor::Replan {
+                every_steps: every
+                    .map_or(DEFAULT_REPLAN_EVERY, |every| every.get_ref().get() as u32),
+                max_deviation: deviation.map_or(0, |deviation| *deviation.get_ref()),
+            }
+        }
     }
 }
 

@@ -22,15 +22,15 @@ impl Compiler<'_> {
         let count = self.body_count(s.count.as_ref(), &s.at, &span)?;
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        self.check_planner(s, &body.effector)?;
-        let has_planner = s.planner.is_some();
+        let planner = self.planner(s, &body.effector)?;
+        let has_planner = planner.is_some();
         let robot = RobotKind { size, body: &body, has_planner };
         let behaviour = self.behaviour(s.behaviour.as_ref(), robot)?;
         let actions = Arc::clone(&body.actions);
         let role = Role::Robot(RobotModel::new(body, behaviour));
         let ty = self.body_type(&s.kind, (size, size), actions, role)?;
         let ty = GroupTypes::Shared(self.add_type(ty, &span)?);
-        Ok(BodyGroup {
+        let group = BodyGroup {
             count,
             places: s.at.clone(),
             region: self.region(s.region.as_ref())?,
@@ -38,8 +38,9 @@ impl Compiler<'_> {
             ty,
             period: period_cycles(s.period),
             phase: s.phase,
-            has_planner,
-        })
+            planner,
+        };
+        self.start_as_planned(s, group)
     }
 
     /// Reads starts and goals from a MovingAI list: the first `count` rows, one robot each.
@@ -60,8 +61,8 @@ impl Compiler<'_> {
         }
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        self.check_planner(s, &body.effector)?;
-        let has_planner = s.planner.is_some();
+        let planner = self.planner(s, &body.effector)?;
+        let has_planner = planner.is_some();
         let routes = RoutePlanner::new(&self.map, size, None, &body, has_planner);
         let alone = (!has_planner).then(|| self.avoidance(None, &routes, &body));
         let mut places = Vec::new();
@@ -76,7 +77,7 @@ impl Compiler<'_> {
             types.push(self.add_type(ty, span)?);
             places.push(Spanned::new(scen.span(), StartPose { at: row.start, facing: None }));
         }
-        Ok(BodyGroup {
+        let group = BodyGroup {
             count: count as u64,
             places,
             region: None,
@@ -84,8 +85,9 @@ impl Compiler<'_> {
             ty: GroupTypes::PerBody(types),
             period: period_cycles(s.period),
             phase: s.phase,
-            has_planner: s.planner.is_some(),
-        })
+            planner,
+        };
+        self.start_as_planned(s, group)
     }
 
     /// Returns a warning where rows of a list are for a map of another name than that of the scenario.
@@ -430,6 +432,6 @@ fn boxes_of([col, row, width, height]: [u32; 4]) -> impl Iterator<Item = (u32, u
 }
 
 /// One box unless the scenario says otherwise.
-fn side_boxes(s: &RobotSection) -> u32 {
+pub(super) fn side_boxes(s: &RobotSection) -> u32 {
     s.size.map_or(1, |side| side.get() as u32)
 }

@@ -1,0 +1,176 @@
+//! Carrying out a plan by agents that may be late, or slip: which action each does next, and when a plan has to be made
+//! anew.
+//!
+//! An executor sees where the agents truly are before each step. What it knows of a plan is an [`Execution`], all of
+//! which can be kept and taken up again.
+
+use crate::dependency_graph::DependencyGraph;
+use crate::plan::Plan;
+use crate::pose::{Action, ActionModel, GridPose};
+use serde::{Deserialize, Serialize};
+
+/// Steps without progress of anybody after which a plan whose order is kept is given up: something that the plan does
+/// not know stands in the way. Longer than most delays of a robot, of which all behind it would make a new plan.
+const MAX_STALL_STEPS: u32 = 16;
+
+/// The rule by which a plan is carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Executor {
+    /// By the clock, whatever has come of the actions before.
+    Blind,
+    /// In the order in which the plan's agents pass each box, by its [`DependencyGraph`]: an agent waits until those that
+    /// pass before it have. A plan is made anew where an agent is nowhere on its path.
+    #[default]
+    Adg,
+    /// By the clock, and the plan is made anew every so many steps, and as soon as an agent is off its plan by more than
+    /// so much.
+    Replan {
+        /// Steps for which a plan is used.
+        every_steps: u32,
+        /// Boxes and quarter turns by which an agent may be off its plan.
+        max_deviation: u32,
+    },
+}
+
+/// A plan in the course of being carried out.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Execution {
+    /// The plan.
+    pub plan: Plan,
+    /// Steps since it began.
+    pub step: u32,
+    /// Actions that each agent has done, waits aside; only [`Executor::Adg`] counts them.
+    pub progress: Vec<u32>,
+    /// Steps since an agent has last made progress.
+    pub stall_steps: u32,
+}
+
+/// What an executor knows beside the plan itself in a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Execute<'a> {
+    pub(crate) executor: Executor,
+    pub(crate) model: ActionModel,
+    /// The order of the plan's actions.
+    pub(crate) graph: &'a DependencyGraph,
+    /// Whether an agent can enter a box that another one leaves in the same step.
+    pub(crate) may_follow: bool,
+}
+
+impl Execution {
+    /// Creates what is known of a plan before its first step.
+    pub fn new(plan: Plan) -> Self {
+        let progress = vec![0; plan.agents()];
+        Self { plan, step: 0, progress, stall_steps: 0 }
+    }
+
+    /// Takes in where the agents have come to with the last step. Returns whether the plan can go on.
+    pub(crate) fn advance(&mut self, by: &Execute<'_>, poses: &[GridPose]) -> bool {
+        self.step += 1;
+        match by.executor {
+            Executor::Blind => true,
+            Executor::Replan { every_steps, max_deviation } => {
+                self.step < every_steps && self.deviation(poses) <= max_deviation
+            }
+            Executor::Adg => self.advance_in_order(by.graph, poses),
+        }
+    }
+
+    fn advance_in_order(&mut self, graph: &DependencyGraph, poses: &[GridPose]) -> bool {
+        self.stall_steps += 1;
+        for (agent, (&pose, progress)) in poses.iter().zip(&mut self.progress).enumerate() {
+            let done = *progress as usize;
+            if graph.action(agent, done).is_some_and(|(_, after)| after == pose) {
+                *progress += 1;
+                self.stall_steps = 0;
+                continue;
+            }
+            let before = match done.checked_sub(1) {
+                Some(last) => graph.action(agent, last).map(|(_, after)| after),
+                None => Some(self.plan.pose(agent, 0)),
+            };
+            if before != Some(pose) {
+                return false;
+            }
+        }
+        // Whoever has no action left cannot make progress.
+        self.stall_steps < MAX_STALL_STEPS || self.is_complete(graph)
+    }
+
+    fn is_complete(&self, graph: &DependencyGraph) -> bool {
+        let mut progress = self.progress.iter().enumerate();
+        progress.all(|(agent, &done)| done as usize >= graph.actions(agent))
+    }
+
+    /// Returns by how much the agent that is farthest off its plan is.
+    fn deviation(&self, poses: &[GridPose]) -> u32 {
+        let step = self.step as usize;
+        let deviations = poses.iter().enumerate();
+        deviations
+            .map(|(agent, &pose)| pose.steps_off(self.plan.pose(agent, step)))
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Returns whether the plan has no steps left, whoever has done them.
+    pub(crate) fn is_over(&self, by: &Execute<'_>) -> bool {
+        match by.executor {
+            Executor::Adg => self.is_complete(by.graph),
+            Executor::Blind | Executor::Replan { .. } => self.step as usize >= self.plan.steps(),
+        }
+    }
+
+    /// Returns the next action of each agent; `idle` agents cannot act in this step.
+    pub(crate) fn actions(&self, by: &Execute<'_>, idle: &[u32]) -> Vec<Action> {
+        if by.executor == Executor::Adg {
+            return self.actions_in_order(by, idle);
+        }
+        let step = self.step as usize;
+        let action = |agent| {
+            let [from, to] = [step, step + 1].map(|step| self.plan.pose(agent, step));
+            by.model.action_between(from, to).unwrap_or(Action::Wait)
+        };
+        (0..self.plan.agents()).map(action).collect()
+    }
+
+    /// Returns the next actions of those who may begin theirs. Where agents may follow each other, all whose turn it is go
+    /// on together with those for whom they wait: at first all may go, then whoever waits for one that does not is left
+    /// out, until nobody is. So queues and circles move as one.
+    fn actions_in_order(&self, by: &Execute<'_>, idle: &[u32]) -> Vec<Action> {
+        let agents = self.progress.len();
+        let next = |agent: usize| by.graph.action(agent, self.progress[agent] as usize);
+        let mut may_go: Vec<bool> = (0..agents)
+            .map(|agent| next(agent).is_some() && !idle.contains(&(agent as u32)))
+            .collect();
+        loop {
+            let must_wait: Vec<usize> = (0..agents)
+                .filter(|&agent| may_go[agent] && !self.is_free(by, agent, &may_go))
+                .collect();
+            if must_wait.is_empty() {
+                break;
+            }
+            must_wait.iter().for_each(|&agent| may_go[agent] = false);
+        }
+        let action =
+            |agent: usize| if may_go[agent] { next(agent).map(|(action, _)| action) } else { None };
+        (0..agents).map(|agent| action(agent).unwrap_or(Action::Wait)).collect()
+    }
+
+    /// Returns whether all that an agent's next action waits for is done, or done in this step by one that may go.
+    fn is_free(&self, by: &Execute<'_>, agent: usize, may_go: &[bool]) -> bool {
+        let index = self.progress[agent] as usize;
+        let is_done = |(other, action): (usize, usize)| {
+            let done = self.progress[other] as usize;
+            done > action || (by.may_follow && done == action && may_go[other])
+        };
+        // Those who rotate do not depend on each other in the graph, but none can go without the others.
+        let is_whole = by.graph.circle(agent, index).is_none_or(|(number, agents)| {
+            agents.iter().all(|&other| {
+                let next = self.progress[other as usize] as usize;
+                let circle = by.graph.circle(other as usize, next);
+                may_go[other as usize]
+                    && circle.is_some_and(|(other_number, _)| other_number == number)
+            })
+        });
+        is_whole && by.graph.dependencies(agent, index).all(is_done)
+    }
+}

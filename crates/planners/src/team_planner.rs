@@ -1,0 +1,413 @@
+//! A team that a planner leads, step by step: it makes a plan, an executor carries it out, and where there is none the
+//! team goes on by priority inheritance.
+
+use crate::dependency_graph::DependencyGraph;
+use crate::executor::{Execute, Execution, Executor};
+use crate::graph::AnchorGraph;
+use crate::instance::{Agent, Instance, check_sizes};
+use crate::lacam::{self, LacamConfig};
+use crate::pibt::{Obstructions, Pibt, PibtConfig, PibtState};
+use crate::plan::Plan;
+use crate::pose::{Action, ActionModel, GridPose};
+use crate::{cbs, prioritized};
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::{InputError, Seed};
+use sidestep_map::planning::FreeSpace;
+use std::collections::{BTreeSet, VecDeque};
+use std::ops::AddAssign;
+use std::sync::Arc;
+
+/// Steps by priority inheritance after a search without a plan, before the next one: the agents have to be elsewhere for
+/// another outcome, and a search that spends its budget takes long.
+const STEPS_WITHOUT_PLAN: u64 = 8;
+
+/// The algorithm by which a team plans.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Method {
+    /// Priority inheritance with backtracking ([`Pibt`]): one step at a time, without an executor.
+    Pibt,
+    /// [`lacam`]: a first plan at once, then better ones within the budget.
+    Lacam {
+        /// Most expansions of a search.
+        budget_expansions: u64,
+    },
+    /// [`prioritized`]: one agent after the other.
+    Prioritized {
+        /// Most orders of the agents that are tried.
+        max_orders: u32,
+    },
+    /// [`cbs`]: the lowest sum of costs.
+    Cbs {
+        /// Most expansions of a search.
+        budget_expansions: u64,
+    },
+    /// A plan that was made elsewhere, from the first step on; where it ends, or cannot be carried out any more, priority
+    /// inheritance leads.
+    Given(Arc<Plan>),
+}
+
+/// The settings of a [`TeamPlanner`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TeamPlannerConfig {
+    /// The algorithm.
+    pub method: Method,
+    /// How its plans are carried out.
+    pub executor: Executor,
+    /// Steps for which a plan is used, whatever becomes of goals meanwhile; without them a plan is made anew as soon as a
+    /// goal changes.
+    pub window: Option<u32>,
+    /// Whether an agent can enter a box that another one leaves in the same step.
+    pub may_follow: bool,
+    /// The seed of all draws.
+    pub seed: Seed,
+}
+
+/// What became of the plans of a team so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct PlanCounts {
+    /// Searches, and of [`Method::Pibt`] steps.
+    pub plans: u64,
+    /// Searches that gave no plan.
+    pub failures: u64,
+    /// Expansions of all searches, and orders of prioritized planning.
+    pub expansions: u64,
+    /// The sum of costs of all plans that were found, and the lowest that they could have had, see
+    /// [`Bounds`](crate::Bounds).
+    pub costs: u64,
+    /// See `costs`.
+    pub bounds: u64,
+}
+
+impl AddAssign for PlanCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.plans += other.plans;
+        self.failures += other.failures;
+        self.expansions += other.expansions;
+        self.costs += other.costs;
+        self.bounds += other.bounds;
+    }
+}
+
+/// All that changes from step to step: to continue elsewhere, keep it.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct TeamPlannerState {
+    /// Priorities, the number of steps, and the goals of the last one.
+    pub pibt: PibtState,
+    /// The plan that is carried out, if there is one.
+    pub execution: Option<Execution>,
+    /// The first step in which a plan may be made again.
+    pub next_search: u64,
+    /// What became of the plans so far.
+    pub counts: PlanCounts,
+    /// The order of the plan's actions, which follows from the plan.
+    #[serde(skip)]
+    graph: Option<Arc<DependencyGraph>>,
+}
+
+impl PartialEq for TeamPlannerState {
+    fn eq(&self, other: &Self) -> bool {
+        // The graph is left out: a state that was kept elsewhere has none yet.
+        self.pibt == other.pibt
+            && self.execution == other.execution
+            && self.next_search == other.next_search
+            && self.counts == other.counts
+    }
+}
+
+impl Eq for TeamPlannerState {}
+
+impl TeamPlannerState {
+    /// Creates the state before the first step.
+    pub fn new(agents: usize) -> Self {
+        Self { pibt: PibtState::new(agents), ..Self::default() }
+    }
+}
+
+/// The planner of a team: what it knows of the floor, and buffers. Its results depend on its arguments and on the
+/// [`TeamPlannerState`].
+#[derive(Debug, Clone)]
+pub struct TeamPlanner {
+    free: FreeSpace,
+    sizes: Vec<u32>,
+    config: TeamPlannerConfig,
+    pibt: Pibt,
+    actions: Vec<Action>,
+}
+
+/// The agents of a team at the start of a step.
+#[derive(Debug, Clone, Copy)]
+pub struct TeamStep<'a> {
+    /// The pose of each agent.
+    pub poses: &'a [GridPose],
+    /// The goal of each agent; one without stays, but makes way.
+    pub goals: &'a [Option<(u32, u32)>],
+    /// What keeps agents from acting.
+    pub obstructions: Obstructions<'a>,
+}
+
+/// A plan and what its search took.
+struct SearchOutcome {
+    plan: Option<Plan>,
+    expansions: u64,
+    /// The lowest sum of costs that a plan could have.
+    bound: u64,
+    costs: u64,
+}
+
+impl TeamPlanner {
+    /// Creates the planner of agents with bodies of these sizes, who have headings, on the free boxes of a floor.
+    ///
+    /// # Errors
+    /// When a size is 0.
+    pub fn new(
+        free: &FreeSpace,
+        sizes: &[u32],
+        config: TeamPlannerConfig,
+    ) -> Result<Self, InputError> {
+        check_sizes(sizes.iter().copied())?;
+        let pibt_config = PibtConfig { seed: config.seed, ..PibtConfig::default() };
+        let pibt = Pibt::new(free, sizes, pibt_config)?;
+        Ok(Self { free: free.clone(), sizes: sizes.to_vec(), config, pibt, actions: Vec::new() })
+    }
+
+    /// Returns the next action of each agent, and advances the state by one step.
+    ///
+    /// # Errors
+    /// As [`Pibt::step`].
+    pub fn step(
+        &mut self,
+        state: &mut TeamPlannerState,
+        now: TeamStep<'_>,
+    ) -> Result<&[Action], InputError> {
+        if self.config.method != Method::Pibt {
+            self.renew(state, now);
+            if let (Some(execution), Some(graph)) = (&state.execution, &state.graph) {
+                self.actions = execution.actions(&self.execute(graph), now.obstructions.idle);
+                // The next step by priority inheritance, if there is one, compares its goals with these.
+                state.pibt.goals.copy_from_slice(now.goals);
+                state.pibt.step += 1;
+                return Ok(&self.actions);
+            }
+        } else {
+            state.counts.plans += 1;
+        }
+        self.pibt.step_among(&mut state.pibt, now.poses, now.goals, now.obstructions)
+    }
+
+    /// Drops the plan if it cannot go on or its time is over, and makes another one if it is time for that.
+    fn renew(&self, state: &mut TeamPlannerState, now: TeamStep<'_>) {
+        if let Some(execution) = &mut state.execution {
+            let graph = state.graph.take().or_else(|| self.graph_of(&execution.plan).map(Arc::new));
+            let goes_on = graph.as_ref().is_some_and(|graph| {
+                let by = self.execute(graph);
+                execution.advance(&by, now.poses)
+                    && !self.is_stale(execution, &by, &state.pibt.goals, now)
+            });
+            if goes_on {
+                state.graph = graph;
+                return;
+            }
+            state.execution = None;
+        }
+        if state.pibt.step < state.next_search {
+            return;
+        }
+        let outcome = self.search(&state.counts, now);
+        state.counts.plans += 1;
+        state.counts.expansions += outcome.expansions;
+        let graph = outcome.plan.as_ref().and_then(|plan| self.graph_of(plan));
+        let (Some(plan), Some(graph)) = (outcome.plan, graph) else {
+            state.counts.failures += 1;
+            state.next_search = state.pibt.step + STEPS_WITHOUT_PLAN;
+            return;
+        };
+        state.counts.costs += outcome.costs;
+        state.counts.bounds += outcome.bound;
+        state.execution = Some(Execution::new(plan));
+        state.graph = Some(Arc::new(graph));
+    }
+
+    /// Returns whether goals ask for another plan.
+    fn is_stale(
+        &self,
+        execution: &Execution,
+        by: &Execute<'_>,
+        last_goals: &[Option<(u32, u32)>],
+        now: TeamStep<'_>,
+    ) -> bool {
+        if matches!(self.config.method, Method::Given(_)) {
+            return execution.is_over(by);
+        }
+        let mut agents = now.poses.iter().zip(now.goals);
+        // A plan also leads those without a goal, out of the way of others: they are where they should be.
+        let is_served = agents.all(|(pose, goal)| goal.is_none_or(|goal| pose.position() == goal));
+        let is_over = execution.is_over(by) && !is_served;
+        match self.config.window {
+            Some(window) => is_over || execution.step >= window && !is_served,
+            None => is_over || now.goals != last_goals,
+        }
+    }
+
+    fn execute<'a>(&self, graph: &'a DependencyGraph) -> Execute<'a> {
+        Execute {
+            executor: self.config.executor,
+            model: ActionModel::Turns,
+            graph,
+            may_follow: self.config.may_follow,
+        }
+    }
+
+    /// Returns the order of a plan's actions; none if the plan is wrong.
+    fn graph_of(&self, plan: &Plan) -> Option<DependencyGraph> {
+        if plan.agents() != self.sizes.len() {
+            return None;
+        }
+        let agents = self.sizes.iter().enumerate().map(|(agent, &size)| Agent {
+            size,
+            start: plan.pose(agent, 0),
+            goal: plan.pose(agent, plan.steps()).position(),
+        });
+        let instance = Instance::new(&self.free, ActionModel::Turns, agents.collect()).ok()?;
+        DependencyGraph::new(&instance, plan).ok()
+    }
+
+    fn search(&self, counts: &PlanCounts, now: TeamStep<'_>) -> SearchOutcome {
+        let none = SearchOutcome { plan: None, expansions: 0, bound: 0, costs: 0 };
+        if let Method::Given(plan) = &self.config.method {
+            let starts = (0..plan.agents()).map(|agent| plan.pose(agent, 0));
+            let is_first = counts.plans == 0 && starts.eq(now.poses.iter().copied());
+            let plan = is_first.then(|| Plan::clone(plan));
+            return SearchOutcome { plan, ..none };
+        }
+        let goals = self.goals_apart(now);
+        let mut agents = Vec::with_capacity(goals.len());
+        for ((&size, &start), goal) in self.sizes.iter().zip(now.poses).zip(goals) {
+            let Some(goal) = goal else { return none };
+            agents.push(Agent { size, start, goal });
+        }
+        let others: BTreeSet<(u32, u32)> = now.obstructions.boxes.iter().copied().collect();
+        // Other bodies are walls, unless an agent could not get anywhere: then they may move on.
+        if !others.is_empty() {
+            let is_free = |col, row| self.free.is_free(col, row) && !others.contains(&(col, row));
+            let floor = FreeSpace::new(self.free.width(), self.free.height(), is_free);
+            if let Ok(outcome) = self.search_on(&floor, &agents, counts) {
+                return outcome;
+            }
+        }
+        self.search_on(&self.free, &agents, counts).unwrap_or(none)
+    }
+
+    fn search_on(
+        &self,
+        floor: &FreeSpace,
+        agents: &[Agent],
+        counts: &PlanCounts,
+    ) -> Result<SearchOutcome, InputError> {
+        let instance = Instance::new(floor, ActionModel::Turns, agents.to_vec())?;
+        let bound = instance.bounds()?.sum_of_costs;
+        let (plan, expansions) = self.plan(&instance, counts)?;
+        let costs = plan.as_ref().map_or(0, |plan| plan.costs(&instance).sum_of_costs);
+        Ok(SearchOutcome { plan, expansions, bound, costs })
+    }
+
+    fn plan(
+        &self,
+        instance: &Instance,
+        counts: &PlanCounts,
+    ) -> Result<(Option<Plan>, u64), InputError> {
+        match self.config.method {
+            Method::Lacam { budget_expansions } => {
+                // Each search has its own draws, so that one after a failure is another one.
+                let seed = Seed(self.config.seed.0.wrapping_add(counts.plans));
+                let config = LacamConfig { budget_expansions, seed, ..LacamConfig::default() };
+                let outcome = lacam::plan(instance, config)?;
+                Ok((outcome.plan, outcome.expansions))
+            }
+            Method::Prioritized { max_orders } => {
+                let outcome = prioritized::plan(instance, max_orders)?;
+                Ok((outcome.plan, u64::from(outcome.orders)))
+            }
+            Method::Cbs { budget_expansions } => {
+                let outcome = cbs::plan(instance, budget_expansions)?;
+                Ok((outcome.plan, outcome.expansions))
+            }
+            Method::Pibt | Method::Given(_) => Ok((None, 0)),
+        }
+    }
+
+    /// Returns goals of which no two overlap: those given, and for agents without one, or whose goal overlaps that of an
+    /// agent before, the place nearest to where they are that overlaps none. None where there is no such place.
+    fn goals_apart(&self, now: TeamStep<'_>) -> Vec<Option<(u32, u32)>> {
+        let mut floor = ClaimedFloor::new(&self.free);
+        let mut goals = vec![None; now.goals.len()];
+        for (agent, &goal) in now.goals.iter().enumerate() {
+            goals[agent] = goal.filter(|&goal| floor.claim(goal, self.sizes[agent]));
+        }
+        for (agent, &pose) in now.poses.iter().enumerate() {
+            let size = self.sizes[agent];
+            if goals[agent].is_none() {
+                let graph = AnchorGraph::new(&self.free, size);
+                goals[agent] = floor.nearest(&graph, pose.position());
+                goals[agent].iter().for_each(|&goal| {
+                    floor.claim(goal, size);
+                });
+            }
+        }
+        goals
+    }
+}
+
+/// The boxes that goals take up.
+struct ClaimedFloor {
+    width: u32,
+    height: u32,
+    is_claimed: Vec<bool>,
+}
+
+impl ClaimedFloor {
+    fn new(free: &FreeSpace) -> Self {
+        let boxes = free.width() as usize * free.height() as usize;
+        Self { width: free.width(), height: free.height(), is_claimed: vec![false; boxes] }
+    }
+
+    /// Claims the boxes of a body, unless one is claimed already; returns whether it did.
+    fn claim(&mut self, at: (u32, u32), size: u32) -> bool {
+        let Some(boxes) = self.unclaimed_boxes(at, size) else { return false };
+        boxes.iter().for_each(|&index| self.is_claimed[index] = true);
+        true
+    }
+
+    fn unclaimed_boxes(&self, (col, row): (u32, u32), size: u32) -> Option<Vec<usize>> {
+        let mut boxes = Vec::new();
+        for row in row..row + size {
+            for col in col..col + size {
+                let index = (row * self.width + col) as usize;
+                if col >= self.width || row >= self.height || self.is_claimed[index] {
+                    return None;
+                }
+                boxes.push(index);
+            }
+        }
+        Some(boxes)
+    }
+
+    /// Returns the place that is the fewest steps away where no box of a body is claimed.
+    fn nearest(&self, graph: &AnchorGraph, from: (u32, u32)) -> Option<(u32, u32)> {
+        let start = graph.anchor(from)?;
+        let mut is_seen = vec![false; graph.len()];
+        is_seen[start as usize] = true;
+        let mut queue = VecDeque::from([start]);
+        while let Some(at) = queue.pop_front() {
+            let position = graph.position(at);
+            if self.unclaimed_boxes(position, graph.size()).is_some() {
+                return Some(position);
+            }
+            for (_, next) in graph.neighbors(at) {
+                if !std::mem::replace(&mut is_seen[next as usize], true) {
+                    queue.push_back(next);
+                }
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,143 @@
+//! What the planner of a team remembers, in words of a snapshot: a share for each robot.
+//!
+//! | words | of |
+//! |---|---|
+//! | steps without the goal, goal, planned place and heading, times off the plan | each robot |
+//! | the first step of the next search, counts of plans | robot 0 of a team that carries plans out |
+//! | steps of the plan so far, steps without progress | robot 0 where there is a plan |
+//! | actions done, place and heading at its start, number of actions, the actions by 16 | each robot where there is a plan |
+
+use crate::team::TeamMemory;
+use sidestep_planners::{Action, Execution, GridPose, Plan, PlanCounts};
+
+/// Actions by their numbers in a word, two bits each.
+const ACTIONS: [Action; 4] = [Action::Wait, Action::Forward, Action::TurnLeft, Action::TurnRight];
+/// Actions in a word.
+const ACTIONS_PER_WORD: usize = 16;
+
+/// Returns a robot's share.
+pub(crate) fn words(memory: &TeamMemory, robot: usize, is_stepwise: bool) -> Vec<u32> {
+    let planner = &memory.planner;
+    let pose = memory.planned[robot];
+    let heading = pose.map_or(0, |pose| u32::from(pose.heading));
+    let mut words = vec![
+        planner.pibt.ages[robot],
+        packed(planner.pibt.goals[robot]),
+        packed(pose.map(GridPose::position)),
+        heading,
+        memory.off_plan[robot],
+    ];
+    if is_stepwise {
+        return words;
+    }
+    if robot == 0 {
+        let PlanCounts { plans, failures, expansions, costs, bounds } = planner.counts;
+        for number in [planner.next_search, plans, failures, expansions, costs, bounds] {
+            words.extend([number as u32, (number >> 32) as u32]);
+        }
+    }
+    let Some(execution) = &planner.execution else { return words };
+    if robot == 0 {
+        words.extend([execution.step, execution.stall_steps]);
+    }
+    let path = execution.plan.path(robot);
+    let start = packed(Some(path[0].position()));
+    words.extend([execution.progress[robot], start, u32::from(path[0].heading)]);
+    words.extend(packed_actions(path));
+    words
+}
+
+/// Takes over the shares of all robots. A plan that is not whole is left out, and made anew.
+pub(crate) fn restore(memory: &mut TeamMemory, shares: &[&[u32]], is_stepwise: bool) {
+    let mut readers: Vec<Reader<'_>> = shares.iter().map(|&words| Reader { words }).collect();
+    for (robot, reader) in readers.iter_mut().enumerate() {
+        let [age, goal, place, heading, off_plan] = [(); 5].map(|()| reader.next().unwrap_or(0));
+        memory.planner.pibt.ages[robot] = age;
+        memory.planner.pibt.goals[robot] = unpacked(goal);
+        memory.planned[robot] =
+            unpacked(place).map(|(col, row)| GridPose::new(col, row, heading as u8));
+        memory.off_plan[robot] = off_plan;
+    }
+    let Some(first) = readers.first_mut().filter(|_| !is_stepwise) else { return };
+    let [next_search, plans, failures, expansions, costs, bounds] =
+        [(); 6].map(|()| first.next_number().unwrap_or(0));
+    memory.planner.next_search = next_search;
+    memory.planner.counts = PlanCounts { plans, failures, expansions, costs, bounds };
+    memory.planner.execution = execution(&mut readers);
+}
+
+fn execution(readers: &mut [Reader<'_>]) -> Option<Execution> {
+    let first = readers.first_mut()?;
+    let step = first.next()?;
+    let stall_steps = first.next()?;
+    let mut progress = Vec::with_capacity(readers.len());
+    let mut paths = Vec::with_capacity(readers.len());
+    for reader in readers {
+        progress.push(reader.next()?);
+        paths.push(reader.path()?);
+    }
+    let is_even = paths.iter().all(|path| path.len() == paths[0].len());
+    is_even.then(|| Execution { plan: Plan::new(paths), step, progress, stall_steps })
+}
+
+/// The rest of a share.
+struct Reader<'a> {
+    words: &'a [u32],
+}
+
+impl Reader<'_> {
+    fn next(&mut self) -> Option<u32> {
+        let (&word, rest) = self.words.split_first()?;
+        self.words = rest;
+        Some(word)
+    }
+
+    fn next_number(&mut self) -> Option<u64> {
+        let low = self.next()?;
+        let high = self.next()?;
+        Some(u64::from(high) << 32 | u64::from(low))
+    }
+
+    fn path(&mut self) -> Option<Vec<GridPose>> {
+        let (col, row) = unpacked(self.next()?)?;
+        let mut pose = GridPose::new(col, row, self.next()? as u8);
+        let actions = self.next()? as usize;
+        let mut path = vec![pose];
+        let mut word = 0;
+        for index in 0..actions {
+            if index.is_multiple_of(ACTIONS_PER_WORD) {
+                word = self.next()?;
+            }
+            pose = pose.after(ACTIONS[(word & 3) as usize])?;
+            word >>= 2;
+            path.push(pose);
+        }
+        Some(path)
+    }
+}
+
+/// Returns the number of actions of a path, and the actions.
+fn packed_actions(path: &[GridPose]) -> Vec<u32> {
+    let mut words = vec![path.len() as u32 - 1];
+    for (index, pair) in path.windows(2).enumerate() {
+        let leads = |&action: &Action| pair[0].after(action) == Some(pair[1]);
+        let action = ACTIONS.iter().position(leads).expect("a plan is made of actions");
+        let place = index % ACTIONS_PER_WORD;
+        if place == 0 {
+            words.push(0);
+        }
+        let last = words.len() - 1;
+        words[last] |= (action as u32) << (2 * place);
+    }
+    words
+}
+
+/// Returns a place in one word, 0 for none. A map has less than 65,535 columns and rows, as positions in a state have
+/// 16 bits each.
+fn packed(place: Option<(u32, u32)>) -> u32 {
+    place.map_or(0, |(col, row)| (col + 1) << 16 | row)
+}
+
+fn unpacked(word: u32) -> Option<(u32, u32)> {
+    (word != 0).then(|| ((word >> 16) - 1, word & 0xffff))
+}
