@@ -286,6 +286,7 @@ mod tests {
         let files = [
             include_str!("../claims/agentfly.toml"),
             include_str!("../claims/loria.toml"),
+            include_str!("../claims/mapf.toml"),
             include_str!("../claims/serpentine.toml"),
         ];
         for file in files.map(ClaimsFile::read) {

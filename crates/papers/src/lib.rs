@@ -1,9 +1,10 @@
-//! The experiments of three papers, run again, and the verdicts on their claims.
+//! The experiments of three papers, run again, a study of our own, and the verdicts on their claims.
 //!
 //! ```text
 //! agentfly.rs      the source paper of the airspace world; agentfly/ has its flights over real sockets
 //! loria/           the source paper of the robots world
 //! serpentine/      the source of the chain world
+//! mapf/            a study of planners and of deciding alone, on wheels that err
 //! methods.rs       methods of the airspace world on the same traffic
 //! study.rs         a sweep file and its scenario -> the table of its runs
 //! scene.rs         the content of a picture
@@ -21,6 +22,7 @@ mod case_results;
 mod claims;
 
 pub mod loria;
+pub mod mapf;
 pub mod methods;
 mod scene;
 pub mod serpentine;

@@ -1,7 +1,8 @@
-//! `sidestep reproduce`: the experiments of a paper, run again. One file per paper.
+//! `sidestep reproduce`: the experiments of a paper, run again, and a study of our own. One file each.
 
 mod agentfly;
 mod loria;
+mod mapf;
 mod serpentine;
 
 use crate::console::{Console, align_pairs};
@@ -23,9 +24,10 @@ Examples:
   sidestep reproduce loria --out runs/loria     report, figures, all numbers
   sidestep reproduce loria --seeds 40 --json > loria.json
   sidestep reproduce agentfly --quick
+  sidestep reproduce mapf --out runs/mapf       half an hour on two processors
   sidestep reproduce serpentine --out runs/serpentine";
 
-/// Reproduce a paper's experiments and judge its claims.
+/// Reproduce a paper's experiments, or a study, and judge the claims.
 #[derive(Debug, Args)]
 pub(crate) struct ReproduceArgs {
     #[command(subcommand)]
@@ -40,6 +42,8 @@ enum Paper {
     Agentfly(agentfly::AgentflyArgs),
     /// Multi-agent serpentine motion with reactive obstacle avoidance (2005)
     Serpentine(serpentine::SerpentineArgs),
+    /// Planners and deciding alone on wheels that err (our own study)
+    Mapf(mapf::MapfArgs),
 }
 
 /// # Errors
@@ -49,6 +53,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
         Paper::Loria(args) => loria::reproduce(args, console),
         Paper::Agentfly(args) => agentfly::reproduce(args, console),
         Paper::Serpentine(args) => serpentine::reproduce(args, console),
+        Paper::Mapf(args) => mapf::reproduce(args, console),
     }
 }
 
