@@ -72,6 +72,8 @@ struct Frame {
 pub(crate) struct Inheritance {
     pub(crate) graphs: Graphs,
     model: ActionModel,
+    /// Whether agents may go in a circle, each into the box that the next one leaves.
+    has_circles: bool,
     cache: DescentCache,
     members: Vec<Member>,
     /// The box of each agent after the step.
@@ -97,6 +99,7 @@ impl Inheritance {
         Self {
             cache: DescentCache::new(graphs.all(), max_cache_bytes),
             model,
+            has_circles: true,
             members: Vec::with_capacity(agents),
             next: vec![NONE; agents],
             status: vec![Status::Undecided; agents],
@@ -109,6 +112,11 @@ impl Inheritance {
             is_broken: false,
             graphs,
         }
+    }
+
+    /// Sets whether agents may go in circles.
+    pub(crate) fn with_circles(self, has_circles: bool) -> Self {
+        Self { has_circles, ..self }
     }
 
     /// Begins a step: nobody has a box yet. The members are those that [`Inheritance::place`] adds then, in their
@@ -460,7 +468,7 @@ impl Inheritance {
                 return false;
             }
             match self.status[other as usize] {
-                Status::Open(depth) if depth < barrier => return false,
+                Status::Open(depth) if depth < barrier || !self.has_circles => return false,
                 Status::Undecided if !self.pushed[first..].contains(&other) => {
                     self.pushed.push(other);
                 }

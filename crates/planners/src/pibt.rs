@@ -32,6 +32,7 @@ const AGE_WITHOUT_SWAPS: u32 = 64;
 pub struct Pibt {
     engine: Inheritance,
     model: ActionModel,
+    action_steps: u32,
     streams: Streams,
     /// Decides between agents of one age.
     ranks: Vec<u32>,
@@ -69,6 +70,10 @@ pub struct PibtConfig {
     /// Most bytes kept for the directions to goals: half a byte per box and goal. It changes no result, but where it is
     /// less than all present goals need, some are computed anew at each step.
     pub max_cache_bytes: usize,
+    /// Steps that an action takes. Above 1, a box that an agent leaves is not free before its action has ended, so agents
+    /// do not go in circles, and one that is to go forward into a box of another one has to wait for it: the caller sees
+    /// to that.
+    pub action_steps: u32,
 }
 
 /// What keeps agents from acting in one step.
@@ -82,7 +87,12 @@ pub struct Obstructions<'a> {
 
 impl Default for PibtConfig {
     fn default() -> Self {
-        Self { model: ActionModel::Turns, seed: Seed(0), max_cache_bytes: 512 << 20 }
+        Self {
+            model: ActionModel::Turns,
+            seed: Seed(0),
+            max_cache_bytes: 512 << 20,
+            action_steps: 1,
+        }
     }
 }
 
@@ -100,8 +110,10 @@ impl Pibt {
         let agents = graphs.agents();
         let streams = Streams::new(config.seed);
         Self {
-            engine: Inheritance::new(graphs, config.model, config.max_cache_bytes),
+            engine: Inheritance::new(graphs, config.model, config.max_cache_bytes)
+                .with_circles(config.action_steps <= 1),
             model: config.model,
+            action_steps: config.action_steps.max(1),
             streams,
             ranks: (0..agents as u32).map(|id| streams.block(id, 0, RANKS, 0)[0]).collect(),
             order: Vec::with_capacity(agents),
@@ -158,7 +170,7 @@ impl Pibt {
             // Whoever gets a new goal on arrival is never seen at the old one.
             let is_served = member.now == member.goal || state.goals[agent] != goal;
             *age = if is_served { 0 } else { age.saturating_add(1) };
-            member.may_swap = may_swap(*age);
+            member.may_swap = may_swap(*age / self.action_steps);
             if !self.engine.place(member, pose.position()) {
                 self.misplaced.push(agent as u32);
             }
@@ -217,8 +229,8 @@ impl Pibt {
             })?,
         };
         let lot = match self.model {
-            ActionModel::Turns => step / STEPS_PER_LOT,
-            ActionModel::Classical => step,
+            ActionModel::Turns => step / (STEPS_PER_LOT * u64::from(self.action_steps)),
+            ActionModel::Classical => step / u64::from(self.action_steps),
         };
         Ok(Member {
             now: graph.node(pose).map_or(NONE, |node| node / 4),

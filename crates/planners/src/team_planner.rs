@@ -58,6 +58,8 @@ pub struct TeamPlannerConfig {
     pub window: Option<u32>,
     /// Whether an agent can enter a box that another one leaves in the same step.
     pub may_follow: bool,
+    /// Steps that an action takes, of [`Method::Pibt`]; other methods plan for actions of one step.
+    pub action_steps: u32,
     /// The seed of all draws.
     pub seed: Seed,
 }
@@ -165,7 +167,8 @@ impl TeamPlanner {
         config: TeamPlannerConfig,
     ) -> Result<Self, InputError> {
         check_sizes(sizes.iter().copied())?;
-        let pibt_config = PibtConfig { seed: config.seed, ..PibtConfig::default() };
+        let action_steps = config.action_steps;
+        let pibt_config = PibtConfig { seed: config.seed, action_steps, ..PibtConfig::default() };
         let pibt = Pibt::new(free, sizes, pibt_config)?;
         Ok(Self { free: free.clone(), sizes: sizes.to_vec(), config, pibt, actions: Vec::new() })
     }

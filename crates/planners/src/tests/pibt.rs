@@ -139,6 +139,20 @@ fn agents_rotate_in_a_full_circle() {
 }
 
 #[test]
+fn agents_whose_actions_take_several_steps_do_not_go_in_a_circle() {
+    let ring = [(0, 0), (1, 0), (1, 1), (0, 1)];
+    let poses = ring.map(|(col, row)| GridPose::new(col, row, 0));
+    let goals = [1, 2, 3, 0].map(|next: usize| Some(ring[next]));
+    let waits = |action_steps| {
+        let config = PibtConfig { action_steps, ..config(ActionModel::Classical, 0) };
+        let mut pibt = Pibt::new(&draw("..\n.."), &[1; 4], config).unwrap();
+        let actions = pibt.step(&mut PibtState::new(4), &poses, &goals).unwrap();
+        actions.iter().filter(|&&action| action == Action::Wait).count()
+    };
+    assert_eq!([waits(1), waits(3)], [0, 4]);
+}
+
+#[test]
 fn two_agents_swap_in_a_corridor_with_a_pocket() {
     for (art, model) in ["......\n###.##", "......\n#.####"]
         .into_iter()

@@ -13,7 +13,14 @@ const SLIPS: Purpose = Purpose(9);
 const REPLAN: Executor = Executor::Replan { every_steps: u32::MAX, max_deviation: 0 };
 
 fn config(method: Method, executor: Executor) -> TeamPlannerConfig {
-    TeamPlannerConfig { method, executor, window: None, may_follow: true, seed: Seed(1) }
+    TeamPlannerConfig {
+        method,
+        executor,
+        window: None,
+        may_follow: true,
+        action_steps: 1,
+        seed: Seed(1),
+    }
 }
 
 fn lacam() -> Method {

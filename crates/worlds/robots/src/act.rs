@@ -113,6 +113,9 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         if walk.steps.is_empty() {
             return;
         }
+        if self.holds_way(body) {
+            return self.execute_steps(walk, walk.steps.len(), slot);
+        }
         let whole = &walk.whole;
         whole.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
         whole
@@ -209,7 +212,8 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         WalkResult { steps: walk.steps.len(), contact: None }
     }
 
-    /// Makes a walk up to its contact, step by step, so that a path over its own boxes ends right.
+    /// Makes a walk up to its contact, step by step, so that a path over its own boxes ends right. A body whose action goes
+    /// on holds the boxes behind it.
     #[inline]
     fn execute_steps(&self, walk: &StepPath, steps: usize, slot: EntitySlot) {
         if steps == 0 {
@@ -219,10 +223,16 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         let body = self.body(slot);
         let base = self.base(body);
         let marks = self.type_of(body).marks;
+        let holds_way = self.holds_way(body);
+        if holds_way {
+            self.note_way(body, walk, steps);
+        }
         let mut moved = body.position();
         let mut first_visits = 0;
         for step in &walk.steps[..steps] {
-            step.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
+            if !holds_way {
+                step.leave.iter().for_each(|&offset| floor.set(box_index(base, offset), T::FREE));
+            }
             for &offset in &step.enter {
                 let index = box_index(base, offset);
                 floor.set(index, T::from_body(slot));

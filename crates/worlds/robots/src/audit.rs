@@ -13,6 +13,7 @@ impl RobotsWorld {
     /// # Errors
     /// Returns a description of the first fault found; that is a bug, not an outcome.
     pub fn audit(&self, state: &RobotsState) -> Result<(), String> {
+        state.release_boxes(self);
         let mut owner = vec![None; self.walls.len()];
         for slot in 0..self.bodies.len() as EntitySlot {
             if !state.is_open_door(self, slot) {
@@ -39,9 +40,14 @@ impl RobotsWorld {
         slot: EntitySlot,
         owner: &mut [Option<EntitySlot>],
     ) -> Result<(), String> {
-        let at = state.position(slot);
-        for &offset in &state.body_type(self, slot).own {
-            let index = at.row_major_index(self.stride).wrapping_add_signed(offset) as usize;
+        let base = state.position(slot).row_major_index(self.stride);
+        let own = &state.body_type(self, slot).own;
+        let mut boxes: Vec<usize> =
+            own.iter().map(|&offset| base.wrapping_add_signed(offset) as usize).collect();
+        boxes.extend(state.way_boxes(self, &state.bodies[slot as usize]));
+        boxes.sort_unstable();
+        boxes.dedup();
+        for index in boxes {
             let is_wall = self.walls.get(index).is_none_or(|&kind| kind != FREE);
             if is_wall {
                 return Err(format!("body {slot} stands in a wall at box {index}"));

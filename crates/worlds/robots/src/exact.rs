@@ -60,6 +60,14 @@ pub fn single_robot(compiled: &Compiled) -> Result<SingleRobot, InputError> {
         let remedy = "leave out [robots.planner]";
         return Err(InputError::new(source_name(compiled), cause, remedy));
     }
+    if body.action_cycles > 1 {
+        let cycles = body.action_cycles;
+        let cause = format!(
+            "the robot's actions take {cycles} cycles, and the states of a chain do not say how long one goes on"
+        );
+        let remedy = format!("give period = {cycles} instead of action_cycles = {cycles}");
+        return Err(InputError::new(source_name(compiled), cause, remedy));
+    }
     if model.body.delays.is_some() {
         let effector = &model.body.effector.name;
         let cause = format!(

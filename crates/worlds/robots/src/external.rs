@@ -159,6 +159,7 @@ impl RobotsWorld {
         team: usize,
         buffers: &mut [BufferMut<'_>],
     ) {
+        state.release_boxes(self);
         let scratch = &mut self.new_scratch();
         with_cycle!(self, state, now, |cycle| {
             for (row, &id) in self.teams.as_slice()[team].agents.iter().enumerate() {
@@ -193,7 +194,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         }
         let contact = body.contact.get().get();
         let (col, map_row) = self.world.map_position(body.position());
-        let is_due = self.world.bodies[id as usize].is_due(self.now);
+        let is_due = self.is_turn(body);
         // 0 is no contact.
         others[0].set_integer(row, contact.map_or(0, |contact| i64::from(contact.kind) + 1));
         others[1].set_integer(row, contact.map_or(0, |contact| contact.side as i64 + 1));

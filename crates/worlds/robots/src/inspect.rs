@@ -99,8 +99,14 @@ impl<'a, T: OccupantWord> Inspector<'a, T> {
         let section = FactSection::new("Now")
             .fact("place", self.position_m())
             .fact("heading", self.facing())
-            .fact("due", timing.is_due(cycle.now))
+            .fact("due", cycle.is_turn(body))
             .fact("acts every", FactValue::number(f64::from(timing.period), "cycles"));
+        let section = if cycle.world.has_long_actions {
+            let left = cycle.state.progress.left(self.id);
+            section.fact("action goes on for", FactValue::number(f64::from(left), "cycles"))
+        } else {
+            section
+        };
         let section = if cycle.world.has_delays {
             let remaining = cycle.state.delays.remaining(self.id);
             section.fact("delayed for", FactValue::number(f64::from(remaining), "cycles"))

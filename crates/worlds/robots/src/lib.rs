@@ -7,7 +7,7 @@
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
-//! plan.rs: before a cycle, the planners of teams (team.rs)
+//! plan.rs: before a cycle, the planners of teams (team.rs)      progress.rs: actions of several cycles
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio
 //! ```
@@ -38,6 +38,7 @@ mod odometry;
 mod perceive;
 mod plan;
 pub mod policy;
+mod progress;
 mod purpose;
 mod ranges;
 mod remarks;
@@ -196,7 +197,7 @@ impl Phases for RobotsWorld {
     }
 
     fn has_plan(&self) -> bool {
-        !self.planner_teams.is_empty()
+        !self.planner_teams.is_empty() || self.has_long_actions
     }
 
     fn plan(phase: &mut PhaseContext<'_, Self>) {

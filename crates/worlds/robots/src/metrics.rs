@@ -92,10 +92,10 @@ impl RobotsWorld {
         }
     }
 
-    /// Returns the actions of a robot before a cycle, without those that a delay took from it.
+    /// Returns the actions of a robot before a cycle, without turns that a delay or an action that went on took from it.
     fn actions(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> u64 {
         let due = self.bodies[id as usize].actions_before(cycle);
-        due - u64::from(state.delays.missed(id))
+        due - u64::from(state.delays.missed(id)) - u64::from(state.progress.busy(id))
     }
 
     /// Returns whether a robot is on a trip. Of one whose actions are ordered, the orders tell: its last trip ended when the

@@ -26,7 +26,12 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         }
         // Most bodies act in every cycle, and their constant part need not be read.
         let is_turn = body.period == 1 || world.bodies[body.id as usize].is_due(self.now);
+        let is_in_action = self.is_in_action(body);
+        let is_turn = is_turn && !is_in_action;
         let is_delayed = world.has_delays && self.spend_delay(body, is_turn, scratch);
+        if is_in_action {
+            self.state.progress.spend(body.id, is_delayed);
+        }
         let is_due = is_turn && !is_delayed;
         if !is_due && world.radio.is_some() {
             // The word of a robot that does not decide goes on to the page that is read next.
@@ -40,6 +45,9 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         };
         let is_clear = !intent.is_idle() && self.claim(slot, intent);
         body.intent.set(if is_clear { intent.with_clear() } else { intent });
+        if world.has_long_actions && !intent.is_idle() && !world.is_door(body.id) {
+            self.begin_action(body, intent.number());
+        }
     }
 
     #[inline]

@@ -20,7 +20,7 @@ struct TeamSituation {
     poses: Vec<GridPose>,
     goals: Vec<Option<(u32, u32)>>,
     others: Vec<(u32, u32)>,
-    delayed: Vec<u32>,
+    idle: Vec<u32>,
 }
 
 impl RobotsWorld {
@@ -37,8 +37,9 @@ impl RobotsWorld {
         states.into()
     }
 
-    /// Plans for each team whose robots are due.
+    /// Plans for each team whose robots are due, after bodies have given up what they left.
     pub(crate) fn plan(&self, state: &RobotsState, now: Cycle) {
+        state.release_boxes(self);
         for (team, team_state) in self.planner_teams.iter().zip(&state.planner_teams) {
             if self.bodies[team.robots.start as usize].is_due(now) {
                 self.plan_team(state, team, team_state);
@@ -52,18 +53,21 @@ impl RobotsWorld {
         let mut situation = self.situation(state, team);
         situation.goals = self.choose_goals(state, team, &memory.planner.pibt.goals);
         memory.compare(&situation.poses);
-        let TeamSituation { poses, goals, others, delayed } = &situation;
-        let obstructions = Obstructions { boxes: others, idle: delayed };
+        let TeamSituation { poses, goals, others, idle } = &situation;
+        let obstructions = Obstructions { boxes: others, idle: idle };
         let now = TeamStep { poses, goals, obstructions };
         let actions = planner.step(&mut memory.planner, now);
         let actions = actions.expect("goals are boxes where the body fits");
         for (robot, (id, &action)) in team.robots.clone().zip(actions).enumerate() {
+            let waits = action == Action::Forward && self.is_kept_out(state, id);
+            let action = if waits { Action::Wait } else { action };
             memory.planned[robot] = poses[robot].after(action);
             decide::Avoidance::order(&state.body(id).memory, action_id(action));
         }
     }
 
-    /// Returns the poses of a team, which of it are delayed, and the boxes of all other bodies.
+    /// Returns the poses of a team, which of it are delayed or in an action, and the boxes of all other bodies. Those that a
+    /// body of the team leaves are none of them: they will be free, and are waited for.
     fn situation(&self, state: &RobotsState, team: &Team) -> TeamSituation {
         let mut situation = TeamSituation::default();
         for (slot, body) in state.bodies.iter().enumerate() {
@@ -80,8 +84,8 @@ impl RobotsWorld {
             let body = state.body(id);
             let (col, row) = self.map_position(body.position());
             situation.poses.push(GridPose::new(col, row, body.facing.get().heading()));
-            if state.delays.remaining(id) > 0 {
-                situation.delayed.push(robot);
+            if state.delays.remaining(id) > 0 || state.progress.left(id) > 0 {
+                situation.idle.push(robot);
             }
         }
         situation
@@ -147,7 +151,9 @@ impl RobotsState {
         for (team, team_state) in world.planner_teams.iter().zip(&self.planner_teams) {
             let mut shares = Vec::new();
             for id in team.robots.clone() {
-                let words_before = world.kinds.len() + self.delays.words(id).count();
+                let words_before = world.kinds.len()
+                    + self.delays.words(id).count()
+                    + self.progress.words(id).count();
                 let words = &records[id as usize].contacts;
                 shares.push(words.get(words_before..).unwrap_or_default());
             }

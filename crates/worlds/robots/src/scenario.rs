@@ -30,7 +30,8 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use values::{
-    BoxSide, Budget, DelayCycles, PathSteps, Period, QuarterTurns, SideBoxes, StartPose, Steps,
+    ActionCycles, BoxSide, Budget, DelayCycles, PathSteps, Period, QuarterTurns, SideBoxes,
+    StartPose, Steps,
 };
 
 /// A whole robots scenario. Every key is described in `scenarios/robots/default.toml`.
@@ -293,6 +294,7 @@ pub(super) struct RobotSection {
     pub(super) size: Option<SideBoxes>,
     pub(super) period: Option<Period>,
     pub(super) phase: Option<u32>,
+    pub(super) action_cycles: Option<ActionCycles>,
     #[serde(default)]
     pub(super) sensors: Vec<Spanned<String>>,
     pub(super) effector: Option<Spanned<String>>,

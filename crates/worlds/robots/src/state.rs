@@ -5,6 +5,7 @@ mod packed;
 use super::broadcast::BroadcastBuffer;
 use super::delay::DelayColumns;
 use super::policy::ConflictPolicy;
+use super::progress::ProgressColumns;
 use super::sensor::{FREE, WALL};
 use super::team::TeamState;
 use super::world::{Body, BodyType, RobotsWorld};
@@ -46,6 +47,8 @@ pub struct RobotsState {
     pub(crate) entered_by: AtomicColumn<u32>,
     /// Delays of each robot; empty where no robot has any.
     pub(crate) delays: DelayColumns,
+    /// Actions that take several cycles; empty without any.
+    pub(crate) progress: ProgressColumns,
     /// The planners of teams.
     pub(crate) planner_teams: Box<[TeamState]>,
     /// Last broadcast of each robot; empty without radio.
@@ -142,8 +145,10 @@ pub struct BodyRecord {
     pub trip: [u64; 2],
     /// Contacts by the number of the kind touched; where some robots have delays, then four words of the body's delays:
     /// the cycles left, those since the last action, those in all, and the turns missed. They stand here so that
-    /// checkpoints of worlds without delays do not depend on them. For the same reason, of a robot that a planner leads,
-    /// the words that this remembers of it come last.
+    /// checkpoints of worlds without delays do not depend on them. For the same reason, where some actions take several
+    /// cycles, five words of the body's action follow: the cycles left, the anchor before it, its walk, the steps made,
+    /// and the cycles in which actions went on in all. Of a robot that a planner leads, the words that this remembers of
+    /// it come last.
     pub contacts: Vec<u32>,
 }
 
@@ -184,6 +189,7 @@ impl RobotsState {
             turns: columns(n),
             entered_by: columns(world.walls.len()),
             delays: DelayColumns::new(if world.has_delays { n } else { 0 }),
+            progress: ProgressColumns::new(if world.has_long_actions { n } else { 0 }),
             planner_teams: world.new_team_states(),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
@@ -204,6 +210,7 @@ impl RobotsState {
             turns: self.turns.clone(),
             entered_by: self.entered_by.clone(),
             delays: self.delays.clone(),
+            progress: self.progress.clone(),
             planner_teams: self.planner_teams.iter().map(TeamState::trial_copy).collect(),
             voices: self.voices.clone(),
             frames: None,
@@ -240,6 +247,8 @@ impl RobotsState {
     /// Stores bodies that are near on the map near in memory, because bodies mostly read the boxes
     /// around them: in bands of rows, each from west to east.
     pub(super) fn arrange(&mut self, world: &RobotsWorld) {
+        // What it leaves has another slot's number after this.
+        self.release_boxes(world);
         self.bodies.sort_unstable_by_key(|body| {
             let band = body.position().row() / ROWS_PER_BAND;
             (band, body.position().col(), body.id)
@@ -281,6 +290,7 @@ impl RobotsState {
             contacts: (0..kinds)
                 .map(|kind| self.contacts.get(first_contact + kind))
                 .chain(self.delays.words(body.id))
+                .chain(self.progress.words(body.id))
                 .chain(self.plan_words(world, body.id))
                 .collect(),
         }
@@ -331,6 +341,8 @@ impl RobotsState {
             self.contacts.set(first_contact + kind, count);
         }
         self.delays.restore(body.id, record.contacts.get(kinds..).unwrap_or_default());
+        let words_before = kinds + self.delays.words(body.id).count();
+        self.progress.restore(body.id, record.contacts.get(words_before..).unwrap_or_default());
         body.anchor.set(world.grid_position(record.at.0, record.at.1).word());
         if !self.is_open_door(world, slot) {
             self.occupy(world, slot);
@@ -348,6 +360,7 @@ impl RobotsState {
                 self.visited.insert(index);
             }
         }
+        self.hold_way(world, slot);
     }
 
     /// Returns the bytes on the heap that grow with the number of boxes, and with that of bodies.
@@ -358,6 +371,7 @@ impl RobotsState {
             + self.contacts.heap_bytes()
             + self.turns.heap_bytes()
             + self.delays.heap_bytes()
+            + self.progress.heap_bytes()
             + self.voices.heap_bytes();
         let boxes = self.floor.heap_bytes()
             + self.visited.heap_bytes()

@@ -98,6 +98,7 @@ impl RobotsWorld {
 
     /// Returns the readings that some robots are about to perceive.
     pub(super) fn scans(&self, state: &RobotsState, now: Cycle, of: &ScanSelection) -> Vec<Scan> {
+        state.release_boxes(self);
         let ids: Vec<EntityId> = match of {
             ScanSelection::First(robots) => self.robots.iter().take(*robots).copied().collect(),
             ScanSelection::Of(bodies) => {

@@ -119,6 +119,8 @@ pub struct RobotsWorld {
     pub(super) has_requests: bool,
     /// Whether there are robots that may be delayed.
     pub(super) has_delays: bool,
+    /// Whether there are robots whose actions take several cycles.
+    pub(super) has_long_actions: bool,
     /// The order in which states store the bodies.
     pub(super) storage: StorageOrder,
     pub(super) streams: Streams,
@@ -144,6 +146,8 @@ pub struct Body {
     pub period: u32,
     /// The body acts in the cycles where `(cycle + phase) % period` is 0.
     pub phase: u32,
+    /// Number of cycles that an action takes, other than a wait.
+    pub action_cycles: u32,
 }
 
 impl Body {

@@ -27,7 +27,7 @@ impl<T: OccupantWord> Inspector<'_, T> {
     pub(super) fn add_percept(&mut self, scratch: &mut Scratch) {
         let body = self.cycle.body(self.slot);
         let Role::Robot(model) = &self.cycle.type_of(body).role else { return };
-        let is_turn = self.cycle.world.bodies[self.id as usize].is_due(self.cycle.now);
+        let is_turn = self.cycle.is_turn(body);
         let is_delayed = self.cycle.delay_cycles(body, is_turn) > 0;
         let is_due = is_turn && !is_delayed;
         let before = super::super::perceive::memory_of(body);
@@ -41,6 +41,8 @@ impl<T: OccupantWord> Inspector<'_, T> {
             with_decision(section, model, decision)
         } else if is_delayed {
             section.fact("action", "none: it is delayed")
+        } else if self.cycle.is_in_action(body) {
+            section.fact("action", "none: its last one goes on")
         } else {
             section.fact("action", "none: it is not its turn")
         };

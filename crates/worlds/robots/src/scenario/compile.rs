@@ -210,6 +210,7 @@ impl<'a> Compiler<'a> {
         let radio = self.radio();
         let has_requests = self.has_requests();
         let has_delays = self.has_delays();
+        let has_long_actions = placer.groups.iter().any(|group| group.action_cycles > 1);
         let kind_rank = self.kind_rank()?;
         let planner_teams = placer.planner_teams();
         let mut world = RobotsWorld {
@@ -229,6 +230,7 @@ impl<'a> Compiler<'a> {
             planner_teams,
             has_requests,
             has_delays,
+            has_long_actions,
             storage: order,
             streams: self.streams,
             border: self.border,

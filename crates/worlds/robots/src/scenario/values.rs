@@ -11,6 +11,8 @@ use sidestep_scenario::{Integer, Rule, invalid_value, schema_by_hand};
 pub(crate) type SideBoxes = Integer<1, 64>;
 /// Cycles of a delay.
 pub(crate) type DelayCycles = Integer<1, { MAX_DELAY_CYCLES as u64 }>;
+/// Cycles that an action takes; as many as a delay may have.
+pub(crate) type ActionCycles = Integer<1, { MAX_DELAY_CYCLES as u64 }>;
 /// Cycles from one action to the next.
 pub(crate) type Period = Integer<1, { u32::MAX as u64 }>;
 

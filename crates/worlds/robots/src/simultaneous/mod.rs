@@ -4,7 +4,8 @@
 //! by their draws, so that each box goes to one body and whoever comes later finds out who has left and who has
 //! stayed. Bodies that wait for each other (rings) are resolved together: their walks are cut until they fit.
 //!
-//! A box that a body has entered in the cycle, even only to pass through, is closed to all others until the next.
+//! A box that a body has entered in the cycle, even only to pass through, is closed to all others until the next. One that
+//! it leaves is closed until the action ends, where that takes several cycles.
 
 mod dependencies;
 #[cfg(test)]
@@ -146,7 +147,7 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
         }
         let slot = word.slot();
         match self.action_of(slot) {
-            Some(action) => !action.sweep.nodes.is_empty(),
+            Some(action) => !action.sweep.nodes.is_empty() && !self.holds_way(self.body(slot)),
             None => !self.body(slot).intent.get().is_idle(),
         }
     }
@@ -318,7 +319,9 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
         if let Some(word) = word {
             let leaves = self.floor.get(index) == word
                 && self.mover_in_ring(word, ring, group).is_some_and(|one| {
-                    !self.covers_at_end(one, index) && !self.enters_boxes_of(one, slot)
+                    !self.holds_way(self.body(one.slot))
+                        && !self.covers_at_end(one, index)
+                        && !self.enters_boxes_of(one, slot)
                 });
             if !leaves {
                 return Some(word);

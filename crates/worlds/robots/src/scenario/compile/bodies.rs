@@ -15,6 +15,7 @@ pub(super) struct BodyGroup {
     pub(super) ty: GroupTypes,
     pub(super) period: u32,
     pub(super) phase: Option<u32>,
+    pub(super) action_cycles: u32,
     /// How a planner leads them, if one does.
     pub(super) planner: Option<TeamPlannerConfig>,
 }
@@ -141,6 +142,11 @@ fn is_inside(from: u32, extent: u32, limit: u32) -> bool {
 /// Bodies act in every cycle unless the scenario says otherwise.
 pub(super) fn period_cycles(period: Option<Period>) -> u32 {
     period.map_or(1, |period| period.get() as u32)
+}
+
+/// Actions of robots take one cycle unless the scenario says otherwise.
+pub(super) fn action_cycles(s: &RobotSection) -> u32 {
+    s.action_cycles.map_or(1, |cycles| cycles.get() as u32)
 }
 
 /// Bodies cover one box unless the scenario says otherwise.

@@ -35,6 +35,7 @@ impl Compiler<'_> {
             ty,
             period: period_cycles(s.period),
             phase: s.phase,
+            action_cycles: 1,
             planner: None,
         })
     }
@@ -63,6 +64,7 @@ impl Compiler<'_> {
             ty: GroupTypes::PerBody(types),
             period: 1,
             phase: Some(0),
+            action_cycles: 1,
             planner: None,
         })
     }

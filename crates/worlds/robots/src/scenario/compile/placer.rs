@@ -52,7 +52,7 @@ impl Placer {
             streams,
             floor: PlacementGrid::new(&self.map),
             spans: vec![0..0; n],
-            bodies: vec![Body { id: 0, ty: 0, period: 1, phase: 0 }; n],
+            bodies: vec![Body { id: 0, ty: 0, period: 1, phase: 0, action_cycles: 1 }; n],
             start: vec![((0, 0), 0); n],
         };
         // Bodies with a given place, as all doors are, come first, because draws must find the free boxes
@@ -102,8 +102,13 @@ impl PlacementBuilder<'_> {
             });
             self.start[id as usize] = (at, facing);
             self.spans[id as usize] = span;
-            self.bodies[id as usize] =
-                Body { id, ty, period: group.period, phase: phase % group.period };
+            self.bodies[id as usize] = Body {
+                id,
+                ty,
+                period: group.period,
+                phase: phase % group.period,
+                action_cycles: group.action_cycles,
+            };
         }
         Ok(())
     }

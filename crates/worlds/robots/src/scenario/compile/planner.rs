@@ -1,7 +1,7 @@
 //! Teams that a planner leads: what their robots must be like, and how they are led.
 
 use super::super::{PlanExecutor, PlannerMethod, PlannerSection, RobotSection, StartPose};
-use super::bodies::{BodyGroup, period_cycles};
+use super::bodies::{BodyGroup, action_cycles, period_cycles};
 use super::robots::side_boxes;
 use super::*;
 use crate::effector::{LEFT, RIGHT, STANDARD_ACTIONS, STAY, Side};
@@ -48,6 +48,7 @@ impl Compiler<'_> {
             executor: executor(planner),
             window: planner.window.as_ref().map(|window| window.get_ref().get() as u32),
             may_follow: self.file.conflict_policy == ConflictPolicy::Simultaneous,
+            action_steps: action_cycles(s),
             seed: Seed(0),
         }))
     }
@@ -195,6 +196,15 @@ impl Compiler<'_> {
             let remedy = "add phase = 0, because a team acts in the same cycles";
             return Err(self.source.error(span.clone(), cause, remedy));
         }
+        let is_stepwise =
+            s.planner.as_ref().is_some_and(|p| p.get_ref().method == PlannerMethod::Pibt);
+        if action_cycles(s) > 1 && !is_stepwise {
+            let cause =
+                "whole plans are of actions that take one cycle, and action_cycles is above 1";
+            let remedy =
+                "give method = \"pibt\", which plans step by step, or leave out `action_cycles`";
+            return Err(self.source.error(span.clone(), cause, remedy));
+        }
         for (action, path, turn) in PLANNED_TRANSITIONS {
             let action = usize::from(action);
             let meant = &effector.transitions[action][0];
@@ -288,6 +298,8 @@ mod tests {
         let avoids = GOES.replace(" }", ", avoidance = \"touch\" }");
         assert_refused(&format!("{avoids}{planner}"), "`avoidance`", "leave out `avoidance`");
         assert_refused(&format!("{GOES}{planner}period = 3\n"), "drawn", "phase = 0");
+        let whole = planner.replace("pibt", "lacam");
+        assert_refused(&format!("{GOES}{whole}action_cycles = 2\n"), "take one cycle", "pibt");
         let unknown = "planner = { method = \"astar\" }\n";
         let error = compiled(&format!("{GOES}{unknown}")).map(|_| ()).expect_err(unknown);
         assert!(error.to_string().contains("pibt"), "{error}");

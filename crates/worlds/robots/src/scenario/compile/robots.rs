@@ -1,7 +1,7 @@
 //! Robot sections: bodies with sensors and effectors, and behaviors.
 
 use super::super::{AvoidanceSection, StartPose};
-use super::bodies::{BodyGroup, GroupTypes, period_cycles};
+use super::bodies::{BodyGroup, GroupTypes, action_cycles, period_cycles};
 use super::random::UnlocatedError;
 use super::unused_keys::BEHAVIOURS;
 use super::*;
@@ -38,6 +38,7 @@ impl Compiler<'_> {
             ty,
             period: period_cycles(s.period),
             phase: s.phase,
+            action_cycles: action_cycles(s),
             planner,
         };
         self.start_as_planned(s, group)
@@ -85,6 +86,7 @@ impl Compiler<'_> {
             ty: GroupTypes::PerBody(types),
             period: period_cycles(s.period),
             phase: s.phase,
+            action_cycles: action_cycles(s),
             planner,
         };
         self.start_as_planned(s, group)

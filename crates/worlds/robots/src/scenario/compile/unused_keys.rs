@@ -73,6 +73,7 @@ fn check_robots(
     let beside_places = [("region", s.region.is_some(), !has_places)];
     source.refuse_unused_keys(section.span(), &beside_places, "beside `at`")?;
     check_phase(source, path, s.period, s.phase)?;
+    check_action_cycles(source, path, s)?;
     match &s.behaviour {
         Some(section) => {
             check_behaviour(source, &format!("{path}behaviour."), section.get_ref(), own)
@@ -155,6 +156,18 @@ fn check_doors(
         }
         _ => Ok(()),
     }
+}
+
+/// Refuses a period beside actions of several cycles: such robots begin the next action when the last one has ended.
+fn check_action_cycles(source: &Source, path: &str, s: &RobotSection) -> Result<(), InputError> {
+    let cycles = super::bodies::action_cycles(s);
+    let period = super::bodies::period_cycles(s.period);
+    if cycles == 1 || period == 1 {
+        return Ok(());
+    }
+    let cause = format!("action_cycles = {cycles} beside a period of {period}");
+    let remedy = "leave out `period`: the next action begins when the last one has ended";
+    Err(source.error_at(&format!("{path}action_cycles"), cause, remedy))
 }
 
 /// Refuses a phase beyond the period, which would be another one.
