@@ -5,6 +5,7 @@ pub mod assignment;
 pub mod cbs;
 pub mod dependency_graph;
 mod descent;
+pub mod dispatcher;
 mod distances;
 mod executor;
 mod goal_fields;
@@ -25,6 +26,7 @@ mod team_planner;
 mod tests;
 
 pub use dependency_graph::{DependencyGraph, Permission};
+pub use dispatcher::{Courier, Dispatcher, TeamTasks};
 pub use executor::{Execution, Executor};
 pub use instance::{Agent, Bounds, Instance};
 pub use pibt::{Obstructions, Pibt, PibtConfig, PibtState};

@@ -41,16 +41,33 @@ impl<'a> Lists<'a> {
         text: &str,
         starts: &[(u32, u32)],
     ) -> Result<Vec<Vec<(u32, u32)>>, InputError> {
-        let source = SourceText { place, text };
         let mut has_robot = vec![false; self.components.sizes().len()];
         for &(col, row) in starts {
             if let Some(label) = self.components.label_at(col, row) {
                 has_robot[label as usize] = true;
             }
         }
+        self.parse_reachable_tasks(SourceText { place, text }, &has_robot)
+    }
+
+    /// As [`Self::parse_tasks`], where robots may start anywhere.
+    pub(super) fn parse_tasks_from_anywhere(
+        &self,
+        place: &str,
+        text: &str,
+    ) -> Result<Vec<Vec<(u32, u32)>>, InputError> {
+        let has_robot = vec![true; self.components.sizes().len()];
+        self.parse_reachable_tasks(SourceText { place, text }, &has_robot)
+    }
+
+    fn parse_reachable_tasks(
+        &self,
+        source: SourceText<'_>,
+        has_robot: &[bool],
+    ) -> Result<Vec<Vec<(u32, u32)>>, InputError> {
         let mut tasks = Vec::new();
         for line in items(source)? {
-            tasks.push(self.errands(source, line, &has_robot)?);
+            tasks.push(self.errands(source, line, has_robot)?);
         }
         Ok(tasks)
     }

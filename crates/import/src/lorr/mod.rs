@@ -168,6 +168,15 @@ pub fn parse_tasks(
     Lists::new(map).parse_tasks(place, text, starts)
 }
 
+/// Reads a list of tasks, plain or with gzip, for a map on which robots may start anywhere.
+///
+/// # Errors
+/// As [`parse_tasks`], and when the file cannot be read.
+pub fn load_tasks(path: &Path, map: &GridMap) -> Result<Vec<Vec<(u32, u32)>>, InputError> {
+    let text = read_text(path, MAX_BYTES)?;
+    Lists::new(map).parse_tasks_from_anywhere(&path.display().to_string(), &text)
+}
+
 fn add_counts(
     report: &mut ImportReport,
     map: &GridMap,

@@ -1,7 +1,7 @@
 //! A robots scenario that needs no other file, as a run folder keeps it.
 //!
 //! The map goes along as the program saw it, one pixel per box, so that a later version of
-//! an importer cannot change the replayed map. Profiles, lists of starts and plans are kept as they are.
+//! an importer cannot change the replayed map. Profiles, lists of starts and tasks, and plans are kept as they are.
 
 use super::scenario::Compiled;
 use serde_json::Value;
@@ -54,7 +54,7 @@ fn add_profiles(bundle: &mut Bundle<'_>, profiles: &Value) -> Result<(), InputEr
     Ok(())
 }
 
-/// Adds the lists of starts and the plans: of many sections `[[robots]]`, or of one `[robots]`.
+/// Adds the lists of starts and tasks and the plans: of many sections `[[robots]]`, or of one `[robots]`.
 fn add_robot_files(bundle: &mut Bundle<'_>, robots: &Value) -> Result<(), InputError> {
     match robots {
         Value::Array(sections) => {
@@ -75,6 +75,7 @@ fn add_section_files(
 ) -> Result<(), InputError> {
     let files = [
         ("scen", section["scen"].as_str(), format!("starts-{number}.scen")),
+        ("tasks.file", section["tasks"]["file"].as_str(), format!("tasks-{number}.tasks")),
         ("planner.file", section["planner"]["file"].as_str(), format!("plan-{number}.plan")),
     ];
     for (key, path, name) in files {

@@ -5,6 +5,7 @@
 //! robot's knowledge is in its [`Memory`], which is part of the state.
 
 mod announce;
+mod errands;
 mod external;
 mod goto;
 pub(crate) mod pass_request;
@@ -17,6 +18,7 @@ mod touch;
 mod wander;
 
 pub use announce::Announce;
+pub use errands::Errands;
 pub use external::External;
 pub use goto::{Avoidance, Goto, Shuttle};
 pub use plan::Planner;

@@ -8,6 +8,7 @@
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
 //! plan.rs: before a cycle, the planners of teams (team.rs)      progress.rs: actions of several cycles
+//! errands.rs: the tasks of teams
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio
 //! ```
@@ -26,6 +27,7 @@ mod cycle_context;
 pub mod decide;
 mod delay;
 mod delayed_turn;
+mod errands;
 pub mod exact;
 mod external;
 mod facts;

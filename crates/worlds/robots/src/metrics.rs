@@ -54,6 +54,10 @@ metrics! {
         pub plan_cost_gap: Option<f64> => "cost of plans above the lower bound",
         /// Processor time of all planners. It differs from run to run, and nothing depends on it.
         pub plan_cpu_s: f64 => "time spent planning",
+        /// Tasks that robots have finished; 0 without `tasks` in a section of robots.
+        pub tasks_finished: u64 => "tasks finished",
+        /// Tasks that are known to a team and not finished.
+        pub tasks_open: u64 => "open tasks",
         /// Share of the free boxes that a robot has covered, 0 to 1. Boxes that robots stand in at the start count.
         pub coverage: f64 => "share of the floor covered",
         /// Share of actions that ended in a contact, 0 to 1.
@@ -140,6 +144,7 @@ impl RobotsWorld {
         let total = self.totals(state, cycle);
         let plans = state.plan_counts();
         let free = self.free_boxes.max(1);
+        let tasks = state.task_counts();
         // Empty bins at the end are left out.
         let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
         Metrics {
@@ -150,6 +155,8 @@ impl RobotsWorld {
             plan_cost_gap: (plans.bounds > 0)
                 .then(|| plans.costs as f64 / plans.bounds as f64 - 1.0),
             plan_cpu_s: stats.plan_ns as f64 / 1e9,
+            tasks_finished: tasks.finished,
+            tasks_open: tasks.open,
             contacts_per_action: total.contacts as f64 / total.actions.max(1) as f64,
             group_sizes: groups.counts[..used].to_vec(),
             largest_group: groups.largest,

@@ -32,7 +32,8 @@ impl RobotsWorld {
             let sizes: Vec<u32> = team.robots.clone().map(|id| self.type_of(id).size.0).collect();
             let [high, low, ..] = self.streams.block(team.robots.start, 0, purpose::PLAN, 0);
             let seed = Seed(u64::from(high) << 32 | u64::from(low));
-            states.push(TeamState::new(&free, &sizes, team, seed));
+            let team_state = TeamState::new(&free, &sizes, team, seed);
+            states.push(team_state.with_tasks(&free, &sizes, team.tasks.as_deref()));
         }
         states.into()
     }
@@ -51,10 +52,12 @@ impl RobotsWorld {
         let (mut planner, mut guard) = team_state.locked();
         let memory = &mut *guard;
         let mut situation = self.situation(state, team);
-        situation.goals = self.choose_goals(state, team, &memory.planner.pibt.goals);
+        let errands = self.errands(state, team, team_state, &situation.poses);
+        situation.goals =
+            errands.unwrap_or_else(|| self.choose_goals(state, team, &memory.planner.pibt.goals));
         memory.compare(&situation.poses);
         let TeamSituation { poses, goals, others, idle } = &situation;
-        let obstructions = Obstructions { boxes: others, idle: idle };
+        let obstructions = Obstructions { boxes: others, idle };
         let now = TeamStep { poses, goals, obstructions };
         let actions = planner.step(&mut memory.planner, now);
         let actions = actions.expect("goals are boxes where the body fits");
@@ -131,22 +134,17 @@ impl RobotsWorld {
         let at = self.map_position(body.position());
         model.behaviour.planned_goals(at, &memory_of(body))
     }
-
-    /// Returns a robot's place in the list of teams, and within its team; none for one that decides alone.
-    fn place_in_team(&self, id: EntityId) -> Option<(usize, usize)> {
-        let team = self.planner_teams.iter().position(|team| team.robots.contains(&id))?;
-        Some((team, (id - self.planner_teams[team].robots.start) as usize))
-    }
 }
 
 impl RobotsState {
     /// Returns what the planner of a robot remembers of it, in words; none of a robot that decides alone.
     pub(crate) fn plan_words(&self, world: &RobotsWorld, id: EntityId) -> Vec<u32> {
-        let place = world.place_in_team(id);
+        let place = place_in_team(world, id);
         place.map_or(Vec::new(), |(team, robot)| self.planner_teams[team].words(robot))
     }
 
-    /// Takes over what [`Self::plan_words`] returned for each robot, before a cycle: it is the end of its record.
+    /// Takes over the tasks and what [`Self::plan_words`] returned for each robot, before a cycle: they are the end of its
+    /// record.
     pub(crate) fn restore_plans(&self, world: &RobotsWorld, records: &[BodyRecord], cycle: Cycle) {
         for (team, team_state) in world.planner_teams.iter().zip(&self.planner_teams) {
             let mut shares = Vec::new();
@@ -154,8 +152,8 @@ impl RobotsState {
                 let words_before = world.kinds.len()
                     + self.delays.words(id).count()
                     + self.progress.words(id).count();
-                let words = &records[id as usize].contacts;
-                shares.push(words.get(words_before..).unwrap_or_default());
+                let words = records[id as usize].contacts.get(words_before..);
+                shares.push(self.restore_task(world, id, words.unwrap_or_default()));
             }
             let step = world.bodies[team.robots.start as usize].actions_before(cycle);
             team_state.restore(&shares, step);
@@ -173,9 +171,15 @@ impl RobotsState {
 
     /// Returns how often a robot was elsewhere than planned.
     pub(crate) fn off_plan(&self, world: &RobotsWorld, id: EntityId) -> u32 {
-        let place = world.place_in_team(id);
+        let place = place_in_team(world, id);
         place.map_or(0, |(team, robot)| self.planner_teams[team].off_plan(robot))
     }
+}
+
+/// Returns a robot's place in the list of teams, and within its team; none for one that decides alone.
+pub(crate) fn place_in_team(world: &RobotsWorld, id: EntityId) -> Option<(usize, usize)> {
+    let team = world.planner_teams.iter().position(|team| team.robots.contains(&id))?;
+    Some((team, (id - world.planner_teams[team].robots.start) as usize))
 }
 
 /// Returns whether a body at one place covers a box that one of the same size at another place does.

@@ -300,6 +300,35 @@ pub(super) struct RobotSection {
     pub(super) effector: Option<Spanned<String>>,
     pub(super) behaviour: Option<Spanned<BehaviourSection>>,
     pub(super) planner: Option<Spanned<PlannerSection>>,
+    pub(super) tasks: Option<Spanned<TaskSection>>,
+}
+
+/// Tasks that robots with a planner carry out, without end: the list begins again where it ends.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TaskSection {
+    /// The errands of each task, one after the other: [[[column, row], ...], ...].
+    pub(super) list: Option<Vec<Spanned<Vec<(u32, u32)>>>>,
+    /// A list of tasks of the League of Robot Runners.
+    pub(super) file: Option<Spanned<PathBuf>>,
+    /// Tasks that are known and not finished at any time, for each robot.
+    pub(super) reveal: Option<Positive>,
+    /// How tasks are given to robots.
+    #[serde(default)]
+    pub(super) policy: TaskPolicyName,
+}
+
+/// How tasks are given to robots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum TaskPolicyName {
+    /// The nearest pair of a robot and a task first.
+    #[default]
+    Nearest,
+    /// The task that was known first, to the nearest robot.
+    Fifo,
+    /// The least sum of ways.
+    Optimal,
 }
 
 /// The planner of a team with common knowledge: it chooses the actions of all robots of the section.

@@ -148,7 +148,7 @@ pub struct BodyRecord {
     /// checkpoints of worlds without delays do not depend on them. For the same reason, where some actions take several
     /// cycles, five words of the body's action follow: the cycles left, the anchor before it, its walk, the steps made,
     /// and the cycles in which actions went on in all. Of a robot that a planner leads, the words that this remembers of
-    /// it come last.
+    /// it come last, and those of its task after them.
     pub contacts: Vec<u32>,
 }
 
@@ -291,6 +291,7 @@ impl RobotsState {
                 .map(|kind| self.contacts.get(first_contact + kind))
                 .chain(self.delays.words(body.id))
                 .chain(self.progress.words(body.id))
+                .chain(self.task_words(world, body.id))
                 .chain(self.plan_words(world, body.id))
                 .collect(),
         }

@@ -3,8 +3,10 @@
 use crate::team_words;
 use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
+use sidestep_planners::tasks::TaskState;
 use sidestep_planners::{
-    GridPose, Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState,
+    Dispatcher, GridPose, Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState,
+    TeamTasks,
 };
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,6 +18,8 @@ pub(crate) struct Team {
     pub(crate) robots: Range<EntityId>,
     /// How they are led. The seed is another one in each run.
     pub(crate) config: TeamPlannerConfig,
+    /// What they carry out; none for robots with goals of their own.
+    pub(crate) tasks: Option<Arc<TeamTasks>>,
 }
 
 /// The planner of a team: what changes, and a cache.
@@ -27,6 +31,16 @@ pub(crate) struct TeamState {
     is_stepwise: bool,
     /// Only the phase *plan* writes it, on one worker.
     memory: Mutex<TeamMemory>,
+    /// The tasks of a team that has some; only the phase *plan* writes them.
+    tasks: Option<Mutex<TaskMemory>>,
+}
+
+/// The tasks of a team, and who gives them to its robots.
+#[derive(Debug, Clone)]
+pub(crate) struct TaskMemory {
+    /// No result depends on what it remembers, so copies of a state share it.
+    pub(crate) dispatcher: Arc<Mutex<Dispatcher>>,
+    pub(crate) state: TaskState,
 }
 
 /// All that the planner of a team remembers.
@@ -56,7 +70,28 @@ impl TeamState {
             planned: vec![None; robots],
             off_plan: vec![0; robots],
         };
-        Self { planner: Arc::new(Mutex::new(planner)), is_stepwise, memory: Mutex::new(memory) }
+        let planner = Arc::new(Mutex::new(planner));
+        Self { planner, is_stepwise, memory: Mutex::new(memory), tasks: None }
+    }
+
+    /// Returns the same team with tasks, which were checked.
+    pub(crate) fn with_tasks(
+        self,
+        free: &FreeSpace,
+        sizes: &[u32],
+        tasks: Option<&TeamTasks>,
+    ) -> Self {
+        let tasks = tasks.zip(sizes.first()).map(|(tasks, &size)| {
+            let dispatcher = Dispatcher::new(free, size, tasks).expect("the tasks were checked");
+            let state = dispatcher.begin(sizes.len());
+            Mutex::new(TaskMemory { dispatcher: Arc::new(Mutex::new(dispatcher)), state })
+        });
+        Self { tasks, ..self }
+    }
+
+    /// Returns the tasks of a team that has some.
+    pub(crate) fn tasks(&self) -> Option<MutexGuard<'_, TaskMemory>> {
+        self.tasks.as_ref().map(lock)
     }
 
     /// Returns the planner and what it remembers, for planning a step.
@@ -67,7 +102,9 @@ impl TeamState {
     /// Returns a copy for trying a cycle.
     pub(crate) fn trial_copy(&self) -> Self {
         let memory = Mutex::new(lock(&self.memory).clone());
-        Self { planner: Arc::clone(&self.planner), is_stepwise: self.is_stepwise, memory }
+        let tasks = self.tasks().map(|tasks| Mutex::new(tasks.clone()));
+        let planner = Arc::clone(&self.planner);
+        Self { planner, is_stepwise: self.is_stepwise, memory, tasks }
     }
 
     /// Returns a robot's share of the state in words.

@@ -212,6 +212,7 @@ fn robots(file: &Value) -> Vec<Value> {
 
 fn robot_section(section: &Value) -> Value {
     let places = section["at"].as_array().map(|at| at.len().into());
+    let default_behaviour = if section["tasks"].is_null() { "wander" } else { "tasks" };
     json!({
         "name": value_or(&section["name"], "robots".into()),
         "count": value_or(&section["count"], places.unwrap_or(Value::Null)),
@@ -219,7 +220,7 @@ fn robot_section(section: &Value) -> Value {
         "period": value_or(&section["period"], 1.into()),
         "sensors": value_or(&section["sensors"], json!([])),
         "effector": value_or(&section["effector"], "perfect".into()),
-        "behaviour": value_or(&section["behaviour"]["kind"], "wander".into()),
+        "behaviour": value_or(&section["behaviour"]["kind"], default_behaviour.into()),
     })
 }
 

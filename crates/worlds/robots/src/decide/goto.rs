@@ -27,6 +27,14 @@ pub enum Avoidance {
 /// Word 1 of a robot that a planner leads: the action plus 1, or 0 for none.
 const ORDER_WORD: usize = 1;
 
+/// Returns the action that a planner wrote into a memory, and removes it.
+pub(super) fn take_order(memory: &mut Memory) -> ActionId {
+    match std::mem::take(&mut memory.words[ORDER_WORD]) {
+        0 => STAY,
+        order => (order - 1) as ActionId,
+    }
+}
+
 impl Avoidance {
     /// Writes the next action of a robot that a planner leads into its memory. It stands until the robot's next turn.
     pub(crate) fn order(memory: &[AtomicCell<u32>; 4], action: ActionId) {
@@ -50,10 +58,7 @@ impl Avoidance {
     ) -> ActionId {
         match self {
             Self::Plan(planner) => planner.step(goal, percept, memory, draws),
-            Self::Team(_) => match std::mem::take(&mut memory.words[ORDER_WORD]) {
-                0 => STAY,
-                order => (order - 1) as ActionId,
-            },
+            Self::Team(_) => take_order(memory),
             // Only planners hear requests, and leave a goal for others.
             _ if goal.is_done => STAY,
             Self::Sidestep(trust) => sidestep(*trust, goal.field, percept, memory, draws),

@@ -9,6 +9,7 @@ mod placer;
 mod planner;
 mod remarks;
 mod robots;
+mod tasks;
 pub(super) mod unused_keys;
 
 use self::effectless::{Given, effectless_remarks};
@@ -27,8 +28,8 @@ use super::{
 };
 use crate::action::{Action, own_boxes};
 use crate::decide::{
-    Announce, Avoidance, Behaviour, External, Goto, Planner, Replay, Sector, SensorTrust, Shuttle,
-    StallDetector, Wander,
+    Announce, Avoidance, Behaviour, Errands, External, Goto, Planner, Replay, Sector, SensorTrust,
+    Shuttle, StallDetector, Wander,
 };
 use crate::effector::{ActionId, EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition};
 use crate::policy::ConflictPolicy;
@@ -46,6 +47,7 @@ use sidestep_map::{Cell, GridMap, Rect};
 use sidestep_scenario::{FixedList, Head, Remark, Source, Spanned, suggestion};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Largest number of bodies of a scenario, which finds a slip in `count` before it fills the

@@ -2,7 +2,7 @@
 
 use super::super::{Period, SideBoxes, StartPose};
 use super::*;
-use sidestep_planners::TeamPlannerConfig;
+use sidestep_planners::{TeamPlannerConfig, TeamTasks};
 
 /// Bodies that a scenario describes together.
 #[derive(Debug)]
@@ -18,6 +18,8 @@ pub(super) struct BodyGroup {
     pub(super) action_cycles: u32,
     /// How a planner leads them, if one does.
     pub(super) planner: Option<TeamPlannerConfig>,
+    /// What they carry out, led by the planner.
+    pub(super) tasks: Option<Arc<TeamTasks>>,
 }
 
 /// One type for all of a group, or one for each body where goals or phases are its own.

@@ -37,6 +37,7 @@ impl Compiler<'_> {
             phase: s.phase,
             action_cycles: 1,
             planner: None,
+            tasks: None,
         })
     }
 
@@ -66,6 +67,7 @@ impl Compiler<'_> {
             phase: Some(0),
             action_cycles: 1,
             planner: None,
+            tasks: None,
         })
     }
 

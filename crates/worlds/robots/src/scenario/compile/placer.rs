@@ -39,7 +39,8 @@ impl Placer {
         for (group, first) in self.groups.iter().zip(self.first_ids()) {
             let config = group.planner.clone().filter(|_| group.count > 0);
             let robots = first..first + group.count as EntityId;
-            teams.extend(config.map(|config| Team { robots, config }));
+            let tasks = group.tasks.clone();
+            teams.extend(config.map(|config| Team { robots, config, tasks }));
         }
         teams
     }

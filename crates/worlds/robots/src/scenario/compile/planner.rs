@@ -227,8 +227,8 @@ impl Compiler<'_> {
         s: &RobotSection,
         span: Range<usize>,
     ) -> Result<(), InputError> {
-        // A list of starts and goals is the behavior `goto`.
-        if s.scen.is_some() {
+        // A list of starts and goals is the behavior `goto`, and errands are goals.
+        if s.scen.is_some() || s.tasks.is_some() {
             return Ok(());
         }
         let behaviour = s.behaviour.as_ref().map(Spanned::get_ref);

@@ -8,7 +8,6 @@ use super::*;
 use crate::delay::Delays;
 use sidestep_import::movingai::{ScenRow, load_scen};
 use sidestep_map::planning::Lanes;
-use std::path::PathBuf;
 
 impl Compiler<'_> {
     pub(super) fn robots(
@@ -25,7 +24,11 @@ impl Compiler<'_> {
         let planner = self.planner(s, &body.effector)?;
         let has_planner = planner.is_some();
         let robot = RobotKind { size, body: &body, has_planner };
-        let behaviour = self.behaviour(s.behaviour.as_ref(), robot)?;
+        let tasks = self.tasks(s, count)?.map(Arc::new);
+        let behaviour = match tasks {
+            Some(_) => Arc::new(Errands),
+            None => self.behaviour(s.behaviour.as_ref(), robot)?,
+        };
         let actions = Arc::clone(&body.actions);
         let role = Role::Robot(RobotModel::new(body, behaviour));
         let ty = self.body_type(&s.kind, (size, size), actions, role)?;
@@ -40,6 +43,7 @@ impl Compiler<'_> {
             phase: s.phase,
             action_cycles: action_cycles(s),
             planner,
+            tasks,
         };
         self.start_as_planned(s, group)
     }
@@ -88,6 +92,7 @@ impl Compiler<'_> {
             phase: s.phase,
             action_cycles: action_cycles(s),
             planner,
+            tasks: None,
         };
         self.start_as_planned(s, group)
     }

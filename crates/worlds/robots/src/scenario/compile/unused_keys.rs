@@ -72,6 +72,11 @@ fn check_robots(
     source.refuse_unused_keys(section.span(), &beside_list, because)?;
     let beside_places = [("region", s.region.is_some(), !has_places)];
     source.refuse_unused_keys(section.span(), &beside_places, "beside `at`")?;
+    let has_tasks = s.tasks.is_some();
+    let beside_tasks =
+        [("scen", has_list, !has_tasks), ("behaviour", s.behaviour.is_some(), !has_tasks)];
+    let because = "beside `tasks`, which say where the robots go";
+    source.refuse_unused_keys(section.span(), &beside_tasks, because)?;
     check_phase(source, path, s.period, s.phase)?;
     check_action_cycles(source, path, s)?;
     match &s.behaviour {
