@@ -96,6 +96,29 @@ impl FlowField {
         Some(difference(here, there))
     }
 
+    /// Returns what a cheapest path to the nearest goal costs, by going along it; 0 at a goal. `None` where no path
+    /// leads to one, and outside the grid.
+    pub fn cost(&self, col: u32, row: u32) -> Option<u32> {
+        let mut at = (col, row);
+        let mut sum = 0;
+        while let Some(direction) = self.direction(at.0, at.1) {
+            sum += u32::from(self.step_cost(at.0, at.1, direction));
+            at = neighbor(at.0, at.1, direction);
+        }
+        self.is_goal(at.0, at.1).then_some(sum)
+    }
+
+    /// Returns by how much one box costs more than another one. Both must reach a goal. The value is right for two
+    /// boxes with at most [`FlowField::MAX_COMPARABLE_STEPS`] steps between them.
+    pub fn cost_difference(&self, from: (u32, u32), to: (u32, u32)) -> Option<i32> {
+        let from = self.code(from.0, from.1).filter(|&code| code != UNREACHABLE)?;
+        let to = self.code(to.0, to.1).filter(|&code| code != UNREACHABLE)?;
+        Some(i32::from(difference(from, to)))
+    }
+
+    /// Steps over which the difference of costs is less than half of the number modulo which costs are known.
+    pub const MAX_COMPARABLE_STEPS: u32 = (MODULUS as u32 / 2 - 1) / (1 + OFF_LANE_COST as u32);
+
     /// Returns whether a cheapest path begins with a step in this direction.
     pub fn descends(&self, col: u32, row: u32, direction: u8) -> bool {
         let is_goal = self.is_goal(col, row);
@@ -347,12 +370,14 @@ mod tests {
                     at = neighbor(at.0, at.1, direction);
                 }
                 prop_assert_eq!(paid, if cost == u32::MAX { 0 } else { cost });
+                prop_assert_eq!(field.cost(col, row), (cost != u32::MAX).then_some(cost));
                 for direction in (0..4).filter(|_| cost != u32::MAX) {
                     let there = neighbor(col, row, direction);
                     let is_inside = there.0 < width && there.1 < height;
                     let there = if is_inside { costs[(there.1 * width + there.0) as usize] } else { u32::MAX };
                     let rise = (there != u32::MAX).then(|| there as i32 - cost as i32);
                     prop_assert_eq!(field.rise(col, row, direction).map(i32::from), rise);
+                    prop_assert_eq!(field.cost_difference((col, row), neighbor(col, row, direction)), rise);
                 }
             }
         }
