@@ -32,7 +32,12 @@ fn heading(summary: &Summary) -> String {
 fn cycles_text(summary: &Summary) -> String {
     let done = group_thousands(summary.cycles);
     match summary.status {
-        RunStatus::Complete => done,
+        RunStatus::Complete => match &summary.end_reason {
+            Some(reason) => {
+                format!("{done} of {}, ended by {reason}", group_thousands(summary.cycles_planned))
+            }
+            None => done,
+        },
         RunStatus::Incomplete => {
             format!("{done} of {}: INCOMPLETE", group_thousands(summary.cycles_planned))
         }

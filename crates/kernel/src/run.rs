@@ -184,9 +184,17 @@ impl<W: World> Run<W> {
         orders.into_iter().chain(self.control_log.next_after(self.cycle)).min()
     }
 
-    /// Returns the first cycle after the present one before which orders are replayed or after which metrics are kept.
+    /// Returns the first cycle after the present one at which the world looks at its state.
+    fn next_check(&self) -> Option<Cycle> {
+        let interval = self.world.check_interval()?;
+        (self.cycle / interval + 1).checked_mul(interval)
+    }
+
+    /// Returns the first cycle after the present one before which orders are replayed, or after which the world looks at
+    /// its state or metrics are kept.
     fn next_stop(&self) -> Option<Cycle> {
-        self.next_replay_cycle().into_iter().chain(self.series.next_due(self.cycle)).min()
+        let stops = [self.next_replay_cycle(), self.next_check(), self.series.next_due(self.cycle)];
+        stops.into_iter().flatten().min()
     }
 }
 
@@ -367,6 +375,10 @@ where
         self.world.is_over(&self.state)
     }
 
+    fn end_reason(&self) -> Option<String> {
+        self.world.end_reason(&self.state)
+    }
+
     fn advance(&mut self, cycles: u64) -> u64 {
         let mut done = 0;
         while done < cycles {
@@ -376,8 +388,14 @@ where
                 segment = segment.min(next - self.cycle);
             }
             let next_row = self.series.next_due(self.cycle);
+            let next_check = self.next_check();
             let segment_done = self.run_segment(segment);
             done += segment_done;
+            // Before the row, which has what was found.
+            let is_checked = next_check == Some(self.cycle);
+            if is_checked {
+                self.world.check(&mut self.state, &mut self.collector, self.cycle);
+            }
             if next_row == Some(self.cycle) {
                 self.keep_metrics();
             }

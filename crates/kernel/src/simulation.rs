@@ -40,6 +40,11 @@ pub trait Simulation: Any + Send {
     /// Returns whether the run has finished early, e.g. because every agent has arrived.
     fn is_over(&self) -> bool;
 
+    /// Returns the reason why the run is over early, in a few words, where its world gives one.
+    fn end_reason(&self) -> Option<String> {
+        None
+    }
+
     /// Runs up to `cycles` cycles and returns the number done: fewer when a buffer for recording
     /// is full or the run is over, and 0 only if `cycles` is 0.
     fn advance(&mut self, cycles: u64) -> u64;

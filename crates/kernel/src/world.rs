@@ -153,6 +153,21 @@ pub trait World: Phases<State: Send> + Send + 'static {
         false
     }
 
+    /// Number of cycles from one call of [`World::check`] to the next; `None` for no calls.
+    fn check_interval(&self) -> Option<Cycle> {
+        None
+    }
+
+    /// Looks at the state after `now` cycles, a multiple of [`World::check_interval`], and keeps what it finds in parts
+    /// of the state that no cycle reads. A cheaper way than [`World::before_cycle`] to see what changes slowly.
+    fn check(&self, _: &mut Self::State, _: &mut Self::Collector, _now: Cycle) {}
+
+    /// Returns the reason why the run is over before its planned number of cycles, in a few words; `None` where
+    /// [`World::is_over`] is not true, or says enough.
+    fn end_reason(&self, _: &Self::State) -> Option<String> {
+        None
+    }
+
     /// Moves the results of one worker from one or more cycles to the collector. The share of each
     /// worker differs from run to run.
     fn collect(&self, collector: &mut Self::Collector, scratch: &mut Self::Scratch);

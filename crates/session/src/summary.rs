@@ -45,6 +45,9 @@ pub struct Summary {
     pub cycles: Cycle,
     /// Cycles that the scenario asks for.
     pub cycles_planned: Cycle,
+    /// The reason why the run ended before these, where its world gives one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end_reason: Option<String>,
     /// Number of agents.
     pub agents: usize,
     /// Alias of `agents`, for readers of earlier summaries.
@@ -156,6 +159,7 @@ impl Summary {
             digest: run.digest().to_string(),
             cycles,
             cycles_planned: config.cycles,
+            end_reason: run.end_reason(),
             agents,
             robots: agents,
             workers: cost.workers,

@@ -143,6 +143,10 @@ log_event_kinds! {
     Planned = "planned",
     /// No path to a target was found; the value is its number.
     NotPlanned = "not-planned",
+    /// Bodies wait for each other in a circle; the value is their number, and the body the first of them.
+    Gridlock = "gridlock",
+    /// Such bodies move again.
+    GridlockEnded = "gridlock-ended",
 }
 
 /// The severity of an event, rising.
