@@ -111,6 +111,9 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             body.facing.set(body.facing.get().turned(walk.turn));
         }
         if walk.steps.is_empty() {
+            if walk.turn == 0 {
+                self.state.count_wait(self.world, body);
+            }
             return;
         }
         if self.holds_way(body) {
@@ -159,6 +162,9 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         if scratch.keep_motions {
             let result = WalkResult { steps, ..result };
             self.record_motion(walk, result, body, scratch);
+        }
+        if steps == 0 && (!is_whole || walk.turn == 0) {
+            self.state.count_wait(self.world, body);
         }
         match result.contact {
             None => {

@@ -198,6 +198,12 @@ pub trait Behaviour: std::fmt::Debug + Send + Sync {
         false
     }
 
+    /// Returns the goal to which a robot with this memory goes, by its number among [`Behaviour::flow_fields`]; none for one
+    /// that goes nowhere. Robots with a goal are watched for gridlocks.
+    fn goal(&self, _memory: &Memory) -> Option<usize> {
+        None
+    }
+
     /// Returns whether it follows the orders of a caller ([`External`]) and looks at nothing, so that its
     /// robots need not perceive twice.
     fn is_external(&self) -> bool {

@@ -48,6 +48,9 @@ impl<'a, T: OccupantWord> CycleContext<'a, T> {
             return false;
         }
         self.state.delays.spend(body.id, cycles, is_due);
+        if is_due {
+            self.state.count_wait(self.world, body);
+        }
         // Nothing follows from the readings but the rows of a log.
         if is_due && scratch.keep_readings {
             self.sense(model, body, scratch);

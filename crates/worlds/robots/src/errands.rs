@@ -36,7 +36,7 @@ impl RobotsWorld {
         let ids = team.robots.clone();
         let couriers: Vec<Courier> = ids
             .zip(poses)
-            .map(|(id, &pose)| Courier { pose, is_in_action: state.progress.left(id) > 0 })
+            .map(|(id, &pose)| Courier { pose, is_in_action: state.action_progress.left(id) > 0 })
             .collect();
         let before: Vec<Option<u64>> =
             tasks.agents.iter().map(|own| own.map(|own| own.task)).collect();

@@ -102,7 +102,7 @@ impl<'a, T: OccupantWord> Inspector<'a, T> {
             .fact("due", cycle.is_turn(body))
             .fact("acts every", FactValue::number(f64::from(timing.period), "cycles"));
         let section = if cycle.world.has_long_actions {
-            let left = cycle.state.progress.left(self.id);
+            let left = cycle.state.action_progress.left(self.id);
             section.fact("action goes on for", FactValue::number(f64::from(left), "cycles"))
         } else {
             section

@@ -7,14 +7,15 @@
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
-//! plan.rs: before a cycle, the planners of teams (team.rs)      progress.rs: actions of several cycles
+//! plan.rs: before a cycle, the planners of teams (team.rs)      action_progress.rs: actions of several cycles
 //! errands.rs: the tasks of teams
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
-//! broadcast.rs: the words of the radio
+//! broadcast.rs: the words of the radio          watch/: who comes nearer to its goal, and gridlocks
 //! ```
 
 mod act;
 mod action;
+mod action_progress;
 mod alias_table;
 mod auction;
 mod audit;
@@ -40,7 +41,7 @@ mod odometry;
 mod perceive;
 mod plan;
 pub mod policy;
-mod progress;
+pub mod progress;
 mod purpose;
 mod ranges;
 mod remarks;
@@ -53,6 +54,7 @@ mod team;
 mod team_words;
 mod text;
 mod view;
+mod watch;
 pub mod world;
 pub mod world_impl;
 mod world_type;
@@ -61,6 +63,7 @@ use cycle_context::with_cycle;
 use effector::Side;
 pub use metrics::heap_bytes;
 use policy::ConflictPolicy;
+use progress::GridlockEvent;
 use sensor::Reading;
 pub use sidestep_error_models::{effector, sensor};
 use sidestep_kernel::conflict::ConflictGroups;
@@ -102,6 +105,33 @@ pub enum EventKind {
     DoorOpened,
     /// A door has closed, after it has waited until no body stood in it.
     DoorClosed,
+}
+
+/// An event of a run, as its table and viewers have it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RobotsEvent {
+    /// Of one body.
+    Body(Event),
+    /// Of robots that wait for each other.
+    Gridlock(GridlockEvent),
+}
+
+impl RobotsEvent {
+    /// Returns the cycle in which it happened.
+    pub fn cycle(&self) -> Cycle {
+        match self {
+            Self::Body(event) => event.cycle,
+            Self::Gridlock(event) => event.cycle,
+        }
+    }
+
+    /// Returns the body that it happened to, the first of several.
+    pub fn body(&self) -> EntityId {
+        match self {
+            Self::Body(event) => event.body,
+            Self::Gridlock(event) => event.gridlock.robots.first().copied().unwrap_or_default(),
+        }
+    }
 }
 
 /// The true and the reported reading of one beam, kept where a log for learning is wanted.

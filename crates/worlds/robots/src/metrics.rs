@@ -26,6 +26,11 @@ metrics! {
         pub trip_cycles_mean: Option<f64> => "mean length of a trip" ("cycles"),
         /// Trips under way when the run ended, whose length is not in the mean. It is too low where slow ones are among them.
         pub trips_under_way: u64 => "trips under way",
+        /// Estimate of the mean trip that counts those under way: time on all trips, by trips completed; none without
+        /// these.
+        pub trip_cycles_estimate: Option<f64> => "mean length of a trip with those under way" ("cycles"),
+        /// Share of the turns of robots with a goal in which they neither moved nor turned, 0 to 1, delays included.
+        pub waiting_share: Option<f64> => "share of turns waited",
         /// Boxes that no robot had covered before.
         pub first_visits: u64 => "boxes covered for the first time",
         /// Cycles in which a robot was delayed, of all robots; 0 unless an effector has delays.
@@ -66,6 +71,12 @@ metrics! {
         pub group_sizes: Vec<u64> => "conflict groups by size",
         /// Bodies of the largest conflict group; 0 where no two ever met.
         pub largest_group: u64 => "largest conflict group" ("bodies"),
+        /// Gridlocks begun: robots that wait for each other in a circle, and those that wait for them.
+        pub gridlocks: u64 => "gridlocks",
+        /// Robots in a gridlock at the end.
+        pub robots_in_gridlock: u64 => "robots in a gridlock",
+        /// Cycle after which the first gridlock was found; none without one.
+        pub first_gridlock_cycle: Option<u64> => "cycle of the first gridlock",
     }
 }
 
@@ -88,7 +99,9 @@ impl RobotsWorld {
             contacts_by_kind,
             distance_m: f64::from(body.moves.get()) * self.map.box_size_m,
             trips,
-            trip_cycles_mean: (trips > 0).then(|| body.trip_cycles.get() as f64 / trips as f64),
+            trip_cycles_mean: ratio(body.trip_cycles.get(), trips),
+            trip_cycles_estimate: ratio(self.cycles_on_trips(body, cycle), trips),
+            waiting_share: ratio(state.waits_of(id), self.turns_with_goal(body, cycle)),
             trips_under_way: u64::from(self.is_on_trip(body)),
             first_visits: u64::from(body.first_visits.get()),
             delayed_cycles: u64::from(state.delays.total(id)),
@@ -99,7 +112,7 @@ impl RobotsWorld {
     /// Returns the actions of a robot before a cycle, without turns that a delay or an action that went on took from it.
     fn actions(&self, state: &RobotsState, cycle: Cycle, id: EntityId) -> u64 {
         let due = self.bodies[id as usize].actions_before(cycle);
-        due - u64::from(state.delays.missed(id)) - u64::from(state.progress.busy(id))
+        due - u64::from(state.delays.missed(id)) - u64::from(state.action_progress.busy(id))
     }
 
     /// Returns whether a robot is on a trip. Of one whose actions are ordered, the orders tell: its last trip ended when the
@@ -110,15 +123,35 @@ impl RobotsWorld {
         model.behaviour.is_on_trip(&memory_of(body)) || model.is_external && has_ordered_trips
     }
 
+    /// Returns the cycles that a robot spent on trips, the one under way included.
+    fn cycles_on_trips(&self, body: &BodyState, cycle: Cycle) -> u64 {
+        let since = if self.is_on_trip(body) { body.trip_begun.get() } else { cycle };
+        body.trip_cycles.get() + cycle.saturating_sub(since)
+    }
+
+    /// Returns the turns of a robot in which it had a goal. One that has no goal left stopped at the end of its last
+    /// trip.
+    fn turns_with_goal(&self, body: &BodyState, cycle: Cycle) -> u64 {
+        if self.goal_robots.binary_search(&body.id).is_err() {
+            return 0;
+        }
+        let end = if self.has_goal(body) { cycle } else { body.trip_begun.get() };
+        self.bodies[body.id as usize].actions_before(end)
+    }
+
     /// Returns the counters of all robots together after `cycle` cycles. Names of kinds are looked up once, and not for
     /// every robot: a recorded run does this a thousand times.
     pub fn totals(&self, state: &RobotsState, cycle: Cycle) -> Counters {
         let mut total = Counters::default();
-        let mut trip_cycles = 0;
+        let [mut trip_cycles, mut cycles_on_trips] = [0; 2];
+        let [mut waits, mut turns] = [0; 2];
         let mut contacts = vec![0; self.kinds.len()];
         for &id in &self.robots {
             let body = state.body(id);
             trip_cycles += body.trip_cycles.get();
+            cycles_on_trips += self.cycles_on_trips(body, cycle);
+            waits += state.waits_of(id);
+            turns += self.turns_with_goal(body, cycle);
             total.distance_m += f64::from(body.moves.get()) * self.map.box_size_m;
             total.actions += self.actions(state, cycle, id);
             total.trips += u64::from(body.trips.get());
@@ -134,7 +167,9 @@ impl RobotsWorld {
         total.contacts = contacts.iter().sum();
         total.contacts_by_kind = self.kinds.iter().cloned().zip(contacts).collect();
         // Over all trips, and not over the robots' means, which would count a slow robot's trips more.
-        total.trip_cycles_mean = (total.trips > 0).then(|| trip_cycles as f64 / total.trips as f64);
+        total.trip_cycles_mean = ratio(trip_cycles, total.trips);
+        total.trip_cycles_estimate = ratio(cycles_on_trips, total.trips);
+        total.waiting_share = ratio(waits, turns);
         total
     }
 
@@ -147,7 +182,11 @@ impl RobotsWorld {
         let tasks = state.task_counts();
         // Empty bins at the end are left out.
         let used = groups.counts.iter().rposition(|&n| n > 0).map_or(0, |k| k + 1);
+        let progress = &state.progress;
         Metrics {
+            gridlocks: progress.gridlocks_begun(),
+            robots_in_gridlock: progress.gridlocks().iter().map(|g| g.robots.len() as u64).sum(),
+            first_gridlock_cycle: progress.first_gridlock_cycle(),
             coverage: (self.boxes_covered_at_start() + total.first_visits) as f64 / free as f64,
             plans: plans.plans,
             plan_failures: plans.failures,
@@ -168,6 +207,11 @@ impl RobotsWorld {
     fn boxes_covered_at_start(&self) -> u64 {
         self.robots.iter().map(|&id| self.type_of(id).own.len() as u64).sum()
     }
+}
+
+/// Returns a ratio, where it has a value.
+fn ratio(sum: u64, count: u64) -> Option<f64> {
+    (count > 0).then(|| sum as f64 / count as f64)
 }
 
 /// Returns the bytes on the heap that grow with the boxes, and with the bodies.
@@ -197,6 +241,41 @@ mod tests {
         run.advance(100);
         let total = run.metrics().total;
         assert!(total.trips > 0 && total.trips_under_way == 1, "{total:?}");
+    }
+
+    #[test]
+    fn the_estimate_of_the_mean_trip_counts_the_time_of_those_under_way() {
+        let text = "format = 1\nworld = \"robots\"\nregime = \"reliable\"\n[map]\nascii = \"..........\"\n\
+                    [robots]\nat = [[0, 0, 0], [9, 0, 2]]\n\
+                    behaviour = { kind = \"goto\", goals = [[4, 0], [9, 0]] }\n";
+        let mut run = robots_run(&Source::new("s", text, ""), 1).expect("fits");
+        run.advance(100);
+        let each: Vec<_> = (0..2).map(|id| run.world().counts(run.state(), 100, id)).collect();
+        let total = run.metrics().total;
+        assert!(total.trips > 0 && total.trips_under_way > 0, "{total:?}");
+        let estimate = total.trip_cycles_estimate.expect("some trips");
+        assert!(estimate > total.trip_cycles_mean.expect("some trips"), "{total:?}");
+        // Each robot was on trips from the start to the end.
+        let whole = 100.0 * f64::from(u8::try_from(total.trips_under_way).expect("few"));
+        let done: f64 = each
+            .iter()
+            .filter(|counts| counts.trips_under_way == 0)
+            .map(|counts| counts.trip_cycles_mean.unwrap_or(0.0) * counts.trips as f64)
+            .sum();
+        assert!((estimate * total.trips as f64 - whole - done).abs() < 1e-9, "{total:?}");
+    }
+
+    /// Its first turn is a turn to the left, then it stands: its effector never moves it.
+    #[test]
+    fn a_turn_counts_as_waiting_where_a_robot_neither_moves_nor_turns() {
+        let text = "format = 1\nworld = \"robots\"\nregime = \"effectors\"\n[map]\nascii = \".....\"\n\
+                    [robots]\nat = [[0, 0, 1]]\neffector = \"stuck\"\n\
+                    behaviour = { kind = \"goto\", goals = [[4, 0]], avoidance = \"touch\" }\n\
+                    [effectors.stuck]\nforward = [{ p = 1.0 }]\nleft = [{ p = 1.0, turn = 90 }]\n\
+                    right = [{ p = 1.0, turn = -90 }]\n";
+        let mut run = robots_run(&Source::new("s", text, ""), 1).expect("fits");
+        run.advance(10);
+        assert_eq!(run.metrics().total.waiting_share, Some(0.9));
     }
 
     #[test]

@@ -30,7 +30,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         let is_turn = is_turn && !is_in_action;
         let is_delayed = world.has_delays && self.spend_delay(body, is_turn, scratch);
         if is_in_action {
-            self.state.progress.spend(body.id, is_delayed);
+            self.state.action_progress.spend(body.id, is_delayed);
         }
         let is_due = is_turn && !is_delayed;
         if !is_due && world.radio.is_some() {

@@ -87,7 +87,7 @@ impl RobotsWorld {
             let body = state.body(id);
             let (col, row) = self.map_position(body.position());
             situation.poses.push(GridPose::new(col, row, body.facing.get().heading()));
-            if state.delays.remaining(id) > 0 || state.progress.left(id) > 0 {
+            if state.delays.remaining(id) > 0 || state.action_progress.left(id) > 0 {
                 situation.idle.push(robot);
             }
         }
@@ -151,7 +151,7 @@ impl RobotsState {
             for id in team.robots.clone() {
                 let words_before = world.kinds.len()
                     + self.delays.words(id).count()
-                    + self.progress.words(id).count();
+                    + self.action_progress.words(id).count();
                 let words = records[id as usize].contacts.get(words_before..);
                 shares.push(self.restore_task(world, id, words.unwrap_or_default()));
             }

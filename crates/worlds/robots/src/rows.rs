@@ -5,12 +5,13 @@ use super::calibration_rows::{
 };
 use super::effector::{HEADING_NAMES, Side};
 use super::odometry::DeadReckoning;
+use super::progress::GridlockEvent;
 use super::scenario::RecordSection;
 use super::sensor::SensorModel;
 use super::state::{PoseBuffer, RobotsState};
 use super::table_notes::{CYCLE_DESCRIPTION, box_notes};
 use super::world::{RobotsWorld, Role};
-use super::{Event, EventKind, MotionSample, RangeSample, Scratch, SensorSample};
+use super::{Event, EventKind, MotionSample, RangeSample, RobotsEvent, Scratch, SensorSample};
 use sidestep_kernel::ports::{
     ColumnBlockBuffer, ColumnSpec, ColumnType, ColumnValues, RecordError, Recorder, Table,
     TableBuffer, TableBuffers, TableRowsBuffer, TableSchema,
@@ -32,6 +33,11 @@ const HEADING_DESCRIPTION: &str =
     "heading, counterclockwise from east along the map: 0, 90, 180 or 270 degrees, by name";
 const BODY_DESCRIPTION: &str = "entity id: robots first, then people, then doors";
 
+const SINCE_DESCRIPTION: &str =
+    "cycle since which no robot of a gridlock came nearer to its goal; of a gridlock alone";
+const ROBOTS_DESCRIPTION: &str =
+    "ids of the robots of a gridlock, with blanks between; of a gridlock alone";
+
 /// Returns the table of poses, which are recorded as whole columns because there is one for every body and cycle.
 fn trajectory_table(world: &RobotsWorld) -> TableSchema {
     let column = ColumnSpec::new;
@@ -45,43 +51,54 @@ fn trajectory_table(world: &RobotsWorld) -> TableSchema {
     TableSchema { about: box_notes(world), ..TableSchema::new("trajectories", columns) }
 }
 
-fn event_table(world: &RobotsWorld) -> Table<Event> {
-    let names = ["contact", "door_opened", "door_closed"];
+fn event_table(world: &RobotsWorld) -> Table<RobotsEvent> {
+    let names = ["contact", "door_opened", "door_closed", "gridlock", "gridlock_ended"];
     let kinds = world.kinds.iter().cloned().chain([String::new()]);
     let no_kind = world.kinds.len() as u32;
     let sides = Side::ALL.iter().map(|side| side.name()).chain([""]);
     let no_side = Side::ALL.len() as u32;
     Table::new("events")
         .with_about(box_notes(world))
-        .u64("cycle", CYCLE_DESCRIPTION, |e: &Event| e.cycle)
-        .u32("body", BODY_DESCRIPTION, |e| e.body)
-        .label("event", "what happened", names, |e| match e.event {
-            EventKind::Contact { .. } => 0,
-            EventKind::DoorOpened => 1,
-            EventKind::DoorClosed => 2,
+        .u64("cycle", CYCLE_DESCRIPTION, RobotsEvent::cycle)
+        .u32("body", BODY_DESCRIPTION, RobotsEvent::body)
+        .label("event", "what happened", names, |e| match e {
+            RobotsEvent::Body(Event { event: EventKind::Contact { .. }, .. }) => 0,
+            RobotsEvent::Body(Event { event: EventKind::DoorOpened, .. }) => 1,
+            RobotsEvent::Body(Event { event: EventKind::DoorClosed, .. }) => 2,
+            RobotsEvent::Gridlock(event) => 4 - u32::from(event.has_begun),
         })
-        .label("kind", "kind of the thing touched, empty otherwise", kinds, move |e| {
-            match e.event {
-                EventKind::Contact { kind, .. } => u32::from(kind),
-                _ => no_kind,
+        .label("kind", "kind of the thing touched, empty otherwise", kinds, move |e| match e {
+            RobotsEvent::Body(Event { event: EventKind::Contact { kind, .. }, .. }) => {
+                u32::from(*kind)
             }
+            _ => no_kind,
         })
         .label(
             "side",
             "side of the robot that touched it, empty otherwise",
             sides,
-            move |e| match e.event {
-                EventKind::Contact { side, .. } => side as u32,
+            move |e| match e {
+                RobotsEvent::Body(Event { event: EventKind::Contact { side, .. }, .. }) => {
+                    *side as u32
+                }
                 _ => no_side,
             },
         )
+        .u64("since_cycle", SINCE_DESCRIPTION, |e| match e {
+            RobotsEvent::Body(_) => None,
+            RobotsEvent::Gridlock(event) => Some(event.gridlock.since),
+        })
+        .text("robots", ROBOTS_DESCRIPTION, |e| match e {
+            RobotsEvent::Body(_) => None,
+            RobotsEvent::Gridlock(event) => Some(event.gridlock.ids_text(" ")),
+        })
 }
 
 /// The tables, and their rows until they are recorded.
 #[derive(Debug, Default)]
 struct RowBuffers {
     trajectories: ColumnBlockBuffer,
-    events: TableRowsBuffer<Event>,
+    events: TableRowsBuffer<RobotsEvent>,
     readings: TableRowsBuffer<ReadingRow>,
     motions: TableRowsBuffer<MotionSample>,
     ranges: TableRowsBuffer<RangeRow>,
@@ -112,9 +129,9 @@ pub struct Collector {
     is_recording: bool,
     rows: RowBuffers,
     /// Events as the workers have gathered them,
-    gathered: Vec<Event>,
+    gathered: Vec<RobotsEvent>,
     /// and those that wait for the next frame.
-    pub(super) log: EventBuffer<Event>,
+    pub(super) log: EventBuffer<RobotsEvent>,
     /// The pose that each robot's wheels report, by id, while odometry is watched.
     odometry: Option<Vec<DeadReckoning>>,
     sensor_samples: Vec<SensorSample>,
@@ -183,17 +200,26 @@ impl Collector {
 
     /// Takes a worker's events and samples over.
     pub(super) fn collect(&mut self, scratch: &mut Scratch) {
-        self.gathered.append(&mut scratch.events);
+        self.gathered.extend(scratch.events.drain(..).map(RobotsEvent::Body));
         self.sensor_samples.append(&mut scratch.sensor_samples);
         self.range_samples.append(&mut scratch.range_samples);
         self.motion_samples.append(&mut scratch.motion_samples);
     }
 
+    /// Takes over the gridlocks that a look at the state has found.
+    pub(super) fn push_gridlocks(&mut self, found: Vec<GridlockEvent>) {
+        if self.log.is_enabled || self.rows.events.is_enabled() {
+            self.gathered.extend(found.into_iter().map(RobotsEvent::Gridlock));
+        }
+    }
+
     /// Puts the gathered rows in an order that does not depend on the workers that recorded them. A body has at
     /// most one event and one motion a cycle, so that the order is complete.
     pub(super) fn commit(&mut self, world: &RobotsWorld) {
-        self.gathered.sort_unstable_by_key(|e| (e.cycle, e.body));
-        self.gathered.iter().for_each(|&event| self.log.push(event));
+        self.gathered.sort_by_key(|e| (e.cycle(), matches!(e, RobotsEvent::Gridlock(_)), e.body()));
+        if self.log.is_enabled {
+            self.gathered.iter().for_each(|event| self.log.push(event.clone()));
+        }
         self.rows.events.extend(self.gathered.drain(..));
         self.motion_samples.sort_unstable_by_key(|s| (s.cycle, s.robot));
         for sample in &self.motion_samples {

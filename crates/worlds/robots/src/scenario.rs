@@ -70,6 +70,8 @@ pub(super) struct RobotsFile {
     pub(super) radio: Option<RadioSection>,
     #[serde(default)]
     pub(super) record: RecordSection,
+    #[serde(default)]
+    pub(super) stop: StopSection,
 }
 
 /// A file with sensors and effectors only: a learned profile, or the presets.
@@ -511,6 +513,14 @@ pub(super) struct RandomSection {
 pub(super) struct RadioSection {
     pub(super) range_m: Number<Open<0, 1_000_000>>,
     pub(super) loss: Option<Fraction>,
+}
+
+/// What ends a run before its number of cycles.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct StopSection {
+    /// The first gridlock.
+    pub(super) gridlock: bool,
 }
 
 /// The tables that a run keeps in addition to its summary.

@@ -2,10 +2,11 @@
 
 mod packed;
 
+use super::action_progress::ProgressColumns;
 use super::broadcast::BroadcastBuffer;
 use super::delay::DelayColumns;
 use super::policy::ConflictPolicy;
-use super::progress::ProgressColumns;
+use super::progress::Progress;
 use super::sensor::{FREE, WALL};
 use super::team::TeamState;
 use super::world::{Body, BodyType, RobotsWorld};
@@ -48,13 +49,17 @@ pub struct RobotsState {
     /// Delays of each robot; empty where no robot has any.
     pub(crate) delays: DelayColumns,
     /// Actions that take several cycles; empty without any.
-    pub(crate) progress: ProgressColumns,
+    pub(crate) action_progress: ProgressColumns,
     /// The planners of teams.
     pub(crate) planner_teams: Box<[TeamState]>,
     /// Last broadcast of each robot; empty without radio.
     pub(crate) voices: BroadcastBuffer,
     /// Poses at the start of each cycle, while a run is recorded.
     pub(crate) frames: Option<PoseBuffer>,
+    /// Which robots come nearer to their goals; no cycle reads it.
+    pub progress: Progress,
+    /// Turns of each robot with a goal in which it neither moved nor turned, by id; empty where no robot has goals.
+    pub(crate) waits: AtomicColumn<u32>,
 }
 
 /// One body's share of the state, in one cache line, because a body mostly reads and writes its own and the
@@ -162,6 +167,10 @@ pub struct Snapshot {
     pub bodies: Vec<BodyRecord>,
     /// Visited boxes of the map, one bit each, row by row.
     pub visited: Vec<u8>,
+    /// Which robots come nearer to their goals. It follows from the states before, so the digest of bodies leaves it out.
+    pub progress: Progress,
+    /// Turns of each robot in which it waited, by id; as `progress`.
+    pub waits: Vec<u32>,
 }
 
 impl RobotsState {
@@ -189,10 +198,12 @@ impl RobotsState {
             turns: columns(n),
             entered_by: columns(world.walls.len()),
             delays: DelayColumns::new(if world.has_delays { n } else { 0 }),
-            progress: ProgressColumns::new(if world.has_long_actions { n } else { 0 }),
+            action_progress: ProgressColumns::new(if world.has_long_actions { n } else { 0 }),
             planner_teams: world.new_team_states(),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
             frames: None,
+            progress: Progress::default(),
+            waits: AtomicColumn::filled(world.waits_len(), 0),
         }
     }
 
@@ -210,10 +221,12 @@ impl RobotsState {
             turns: self.turns.clone(),
             entered_by: self.entered_by.clone(),
             delays: self.delays.clone(),
-            progress: self.progress.clone(),
+            action_progress: self.action_progress.clone(),
             planner_teams: self.planner_teams.iter().map(TeamState::trial_copy).collect(),
             voices: self.voices.clone(),
             frames: None,
+            progress: Progress::default(),
+            waits: self.waits.clone(),
         }
     }
 
@@ -272,7 +285,13 @@ impl RobotsState {
     /// Returns the state in the order of ids after `cycle` cycles.
     pub fn snapshot(&self, world: &RobotsWorld, cycle: Cycle) -> Snapshot {
         let bodies = self.slot_of_id.iter().map(|&slot| self.body_record(world, slot, cycle));
-        Snapshot { cycle, bodies: bodies.collect(), visited: self.visited_bits(world) }
+        Snapshot {
+            cycle,
+            bodies: bodies.collect(),
+            visited: self.visited_bits(world),
+            progress: self.progress.clone(),
+            waits: self.waits.iter().collect(),
+        }
     }
 
     fn body_record(&self, world: &RobotsWorld, slot: EntitySlot, cycle: Cycle) -> BodyRecord {
@@ -290,7 +309,7 @@ impl RobotsState {
             contacts: (0..kinds)
                 .map(|kind| self.contacts.get(first_contact + kind))
                 .chain(self.delays.words(body.id))
-                .chain(self.progress.words(body.id))
+                .chain(self.action_progress.words(body.id))
                 .chain(self.task_words(world, body.id))
                 .chain(self.plan_words(world, body.id))
                 .collect(),
@@ -309,7 +328,7 @@ impl RobotsState {
 
     /// Floor and slots are made anew; `snapshot` must be of the same bodies on the same map.
     pub(super) fn restore(world: &RobotsWorld, snapshot: &Snapshot) -> Self {
-        let state = Self::empty(world);
+        let mut state = Self::empty(world);
         for (k, index) in world.map_indices().enumerate() {
             if snapshot.visited[k / 8] >> (k % 8) & 1 == 1 {
                 state.visited.insert(index);
@@ -318,6 +337,8 @@ impl RobotsState {
         for (record, &slot) in snapshot.bodies.iter().zip(&state.slot_of_id) {
             state.restore_body(world, slot, record);
         }
+        state.progress = snapshot.progress.clone();
+        (0..).zip(&snapshot.waits).for_each(|(id, &waits)| state.waits.set(id, waits));
         state.restore_plans(world, &snapshot.bodies, snapshot.cycle);
         state
     }
@@ -343,7 +364,8 @@ impl RobotsState {
         }
         self.delays.restore(body.id, record.contacts.get(kinds..).unwrap_or_default());
         let words_before = kinds + self.delays.words(body.id).count();
-        self.progress.restore(body.id, record.contacts.get(words_before..).unwrap_or_default());
+        self.action_progress
+            .restore(body.id, record.contacts.get(words_before..).unwrap_or_default());
         body.anchor.set(world.grid_position(record.at.0, record.at.1).word());
         if !self.is_open_door(world, slot) {
             self.occupy(world, slot);
@@ -372,7 +394,8 @@ impl RobotsState {
             + self.contacts.heap_bytes()
             + self.turns.heap_bytes()
             + self.delays.heap_bytes()
-            + self.progress.heap_bytes()
+            + self.action_progress.heap_bytes()
+            + self.waits.heap_bytes()
             + self.voices.heap_bytes();
         let boxes = self.floor.heap_bytes()
             + self.visited.heap_bytes()

@@ -28,6 +28,13 @@ pub(super) fn summary_lines(metrics: &Metrics) -> KeyValues {
     if metrics.largest_group > 0 {
         lines.push(key_value_pair("conflict groups", groups(metrics)));
     }
+    if let Some(share) = total.waiting_share {
+        let waited = format!("{:.1} % of the turns of robots with a goal", 100.0 * share);
+        lines.push(key_value_pair("waiting", waited));
+    }
+    if metrics.gridlocks > 0 {
+        lines.push(key_value_pair("gridlocks", gridlocks(metrics)));
+    }
     lines
 }
 
@@ -46,6 +53,14 @@ fn plans(metrics: &Metrics) -> String {
         "{count} of {each_ms:.2} ms each{failures}{gap}; robots off them {} times",
         group_thousands(metrics.total.off_plan)
     )
+}
+
+/// Says how many there were, since when, and whether some stand.
+fn gridlocks(metrics: &Metrics) -> String {
+    let count = group_thousands(metrics.gridlocks);
+    let first = group_thousands(metrics.first_gridlock_cycle.unwrap_or(0));
+    let standing = group_thousands(metrics.robots_in_gridlock);
+    format!("{count}, the first one found after cycle {first}; {standing} robots in one at the end")
 }
 
 fn distance(meters: f64) -> String {
@@ -70,9 +85,14 @@ fn trips(total: &Counters) -> String {
         0 => String::new(),
         n => format!(", without {} under way", group_thousands(n)),
     };
+    let estimate = match total.trip_cycles_estimate {
+        Some(estimate) if total.trips_under_way > 0 => format!(" ({estimate:.1} with them)"),
+        _ => String::new(),
+    };
     match total.trip_cycles_mean {
         Some(mean) => {
-            format!("{}, {mean:.1} cycles on average{under_way}", group_thousands(total.trips))
+            let trips = group_thousands(total.trips);
+            format!("{trips}, {mean:.1} cycles on average{under_way}{estimate}")
         }
         None => "none".into(),
     }

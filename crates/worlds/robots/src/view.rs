@@ -3,16 +3,17 @@
 use super::cycle_context::{CycleContext, with_cycle};
 use super::effector::Side;
 use super::odometry::DeadReckoning;
+use super::progress::GridlockEvent;
 use super::sensor::{NOTHING, Reading, SensorModel};
 use super::state::{BodyState, LastContact, RobotsState};
 use super::world::{BodyType, MountedSensor, Role};
-use super::{Event, EventKind, RobotsWorld, Scratch};
+use super::{Event, EventKind, RobotsEvent, RobotsWorld, Scratch};
 use crate::kinds;
 use sidestep_kernel::math::{cos, sin};
 use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::view::{
     self, Body, BodyCondition, BodyId, BodyKind, CachedIsometry2, LogEvent, LogEventKind, Pose,
-    Scan, ScanSelection, Severity, Shape,
+    Quantity, Scan, ScanSelection, Severity, Shape,
 };
 use sidestep_kernel::{Cycle, EntityId, Phases};
 use sidestep_map::Rect;
@@ -173,7 +174,39 @@ impl RobotsWorld {
         BodyId::new(self.visible_kind(id), id, None)
     }
 
-    pub(super) fn view_event(&self, event: &Event) -> LogEvent {
+    pub(super) fn view_event(&self, state: &RobotsState, event: &RobotsEvent) -> LogEvent {
+        match event {
+            RobotsEvent::Body(event) => self.view_body_event(event),
+            RobotsEvent::Gridlock(event) => self.view_gridlock(state, event),
+        }
+    }
+
+    fn view_gridlock(&self, state: &RobotsState, event: &GridlockEvent) -> LogEvent {
+        let GridlockEvent { cycle, has_begun, gridlock } = event;
+        let mut robots = gridlock.robots.iter().map(|&id| self.body_id(id));
+        let (level, kind, words) = if *has_begun {
+            let words = format!("waits in a gridlock of {gridlock}");
+            (Severity::Error, LogEventKind::Gridlock, words)
+        } else {
+            let words = format!("is free of a gridlock of {gridlock}");
+            (Severity::Info, LogEventKind::GridlockEnded, words)
+        };
+        let who = robots.next().unwrap_or_else(|| self.body_id(0));
+        let [x_m, y_m] =
+            self.middle_m(who.number, self.map_position(state.body(who.number).position()));
+        LogEvent {
+            cycle: *cycle,
+            level,
+            kind,
+            who,
+            with: robots.next(),
+            at_m: Some([x_m, y_m, 0.0]),
+            value: Some(Quantity::new(gridlock.robots.len() as f64, "")),
+            words,
+        }
+    }
+
+    fn view_body_event(&self, event: &Event) -> LogEvent {
         let mut with = None;
         let (level, kind, words) = match event.event {
             EventKind::Contact { kind, side, with: other } => {

@@ -115,6 +115,10 @@ pub struct RobotsWorld {
     pub(super) robots: Vec<EntityId>,
     /// The teams of robots that a planner leads.
     pub(super) planner_teams: Vec<Team>,
+    /// The robots whose behavior has goals, by rising id.
+    pub(super) goal_robots: Vec<EntityId>,
+    /// Whether a run is over at its first gridlock.
+    pub(super) stops_at_gridlock: bool,
     /// Whether there are robots that ask each other to make room.
     pub(super) has_requests: bool,
     /// Whether there are robots that may be delayed.

@@ -2,6 +2,7 @@
 
 use super::metric_info::METRIC_INFO;
 use super::metrics::Metrics;
+use super::progress::{CHECK_CYCLES, Progress};
 use super::rows::Collector;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::state::{BodyRecord, Facing, LastContact, RobotsState, Snapshot};
@@ -11,6 +12,7 @@ use super::{Scratch, text};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{AgentTeams, BufferMut, Order};
+use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{
@@ -39,7 +41,8 @@ impl Compiled {
     /// Returns a run at its start; the world is shared, not copied. `source` names it in
     /// checkpoints.
     pub fn start(self, source: &Source, workers: usize) -> RobotsRun {
-        let state = RobotsState::restore(&self.world, &self.start_snapshot());
+        let mut state = RobotsState::restore(&self.world, &self.start_snapshot());
+        state.progress = self.world.start_progress(&state, 0);
         let config = self.plan();
         let collector = Collector::new(self.record);
         let start = RunInputs { config, state, collector };
@@ -74,7 +77,7 @@ impl Compiled {
             });
         }
         let visited = vec![0; self.world.map.cells().len().div_ceil(8)];
-        Snapshot { cycle: 0, bodies, visited }
+        Snapshot { cycle: 0, bodies, visited, progress: Progress::default(), waits: Vec::new() }
     }
 }
 
@@ -90,6 +93,26 @@ impl World for RobotsWorld {
 
     fn cycles_until_flush(&self, state: &RobotsState, _: &Collector, now: Cycle) -> u64 {
         state.frames.as_ref().map_or(u64::MAX, |poses| poses.first + poses.capacity as u64 - now)
+    }
+
+    fn check_interval(&self) -> Option<Cycle> {
+        (!self.goal_robots.is_empty()).then_some(CHECK_CYCLES)
+    }
+
+    fn check(&self, state: &mut RobotsState, collector: &mut Collector, now: Cycle) {
+        // Moved out while it looks at the rest of the state.
+        let mut progress = std::mem::take(&mut state.progress);
+        collector.push_gridlocks(self.check_progress(&mut progress, state, now));
+        state.progress = progress;
+    }
+
+    fn is_over(&self, state: &RobotsState) -> bool {
+        self.stops_at_gridlock && state.progress.gridlocks_begun() > 0
+    }
+
+    fn end_reason(&self, state: &RobotsState) -> Option<String> {
+        let first = state.progress.first_gridlock().filter(|_| self.is_over(state))?;
+        Some(format!("a gridlock of {first}"))
     }
 
     fn collect(&self, collector: &mut Collector, scratch: &mut Scratch) {
@@ -141,7 +164,15 @@ impl CheckpointableWorld for RobotsWorld {
     type Snapshot = Snapshot;
 
     fn digest(&self, state: &RobotsState, now: Cycle) -> Digest {
-        state.snapshot(self, now).digest()
+        let snapshot = state.snapshot(self, now);
+        if !self.stops_at_gridlock {
+            return snapshot.digest();
+        }
+        // When the run ends follows from it.
+        let mut hasher = Hasher::default();
+        hasher.write_bytes(snapshot.digest().as_bytes());
+        snapshot.progress.write_to(&mut hasher);
+        hasher.finish()
     }
 
     fn save(&self, state: &RobotsState, _: &Collector, now: Cycle) -> Snapshot {
@@ -154,7 +185,9 @@ impl CheckpointableWorld for RobotsWorld {
         collector: &mut Collector,
     ) -> Result<RobotsState, CheckpointError> {
         let fits = saved.bodies.len() == self.bodies.len()
-            && saved.visited.len() == self.map.cells().len().div_ceil(8);
+            && saved.visited.len() == self.map.cells().len().div_ceil(8)
+            && saved.progress.approaches.len() == self.goal_robots.len()
+            && saved.waits.len() == self.waits_len();
         if !fits {
             return Err(CheckpointError::Damaged);
         }
@@ -183,7 +216,7 @@ impl WorldView for RobotsWorld {
             bodies: self.visible_bodies(state),
             scans: self.scans(state, now, &options.scans),
             odometry: self.odometry_poses(collector.odometry()),
-            log: events.iter().map(|event| self.view_event(event)).collect(),
+            log: events.iter().map(|event| self.view_event(state, event)).collect(),
             log_left_out,
         }
     }

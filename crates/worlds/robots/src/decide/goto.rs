@@ -140,6 +140,11 @@ impl Shuttle {
 }
 
 impl Behaviour for Goto {
+    fn goal(&self, memory: &Memory) -> Option<usize> {
+        Some(memory.words[GOALS_REACHED_WORD] as usize)
+            .filter(|&reached| reached < self.goals.len())
+    }
+
     fn is_on_trip(&self, memory: &Memory) -> bool {
         (memory.words[GOALS_REACHED_WORD] as usize) < self.goals.len()
     }
@@ -168,6 +173,10 @@ impl Behaviour for Goto {
 }
 
 impl Behaviour for Shuttle {
+    fn goal(&self, memory: &Memory) -> Option<usize> {
+        Some((memory.words[GOALS_REACHED_WORD] % 2) as usize)
+    }
+
     fn is_on_trip(&self, memory: &Memory) -> bool {
         // The first trip starts at end 0.
         memory.words[GOALS_REACHED_WORD] > 0

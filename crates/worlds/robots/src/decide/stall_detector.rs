@@ -48,6 +48,14 @@ impl Behaviour for StallDetector {
         decision
     }
 
+    fn is_on_trip(&self, memory: &Memory) -> bool {
+        self.inner.is_on_trip(memory)
+    }
+
+    fn goal(&self, memory: &Memory) -> Option<usize> {
+        self.inner.goal(memory)
+    }
+
     fn flow_fields(&self) -> &[Arc<FlowField>] {
         self.inner.flow_fields()
     }

@@ -28,8 +28,8 @@ use super::{
 };
 use crate::action::{Action, own_boxes};
 use crate::decide::{
-    Announce, Avoidance, Behaviour, Errands, External, Goto, Planner, Replay, Sector, SensorTrust,
-    Shuttle, StallDetector, Wander,
+    Announce, Avoidance, Behaviour, Errands, External, Goto, Memory, Planner, Replay, Sector,
+    SensorTrust, Shuttle, StallDetector, Wander,
 };
 use crate::effector::{ActionId, EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition};
 use crate::policy::ConflictPolicy;
@@ -209,6 +209,7 @@ impl<'a> Compiler<'a> {
         let robots = self.robot_ids(&placed.bodies);
         let stride = self.stride();
         let rows = self.map.height() + 2 * self.border;
+        let goal_robots = self.goal_robots(&placed.bodies);
         let radio = self.radio();
         let has_requests = self.has_requests();
         let has_delays = self.has_delays();
@@ -230,6 +231,8 @@ impl<'a> Compiler<'a> {
             teams: Arc::default(),
             robots,
             planner_teams,
+            goal_robots,
+            stops_at_gridlock: self.file.stop.gridlock,
             has_requests,
             has_delays,
             has_long_actions,
@@ -263,6 +266,14 @@ impl<'a> Compiler<'a> {
             }
         }
         ids
+    }
+
+    fn goal_robots(&self, bodies: &[Body]) -> Vec<EntityId> {
+        let has_goals = |body: &&Body| match &self.types[usize::from(body.ty)].role {
+            Role::Robot(model) => model.behaviour.goal(&Memory::default()).is_some(),
+            _ => false,
+        };
+        bodies.iter().filter(has_goals).map(|body| body.id).collect()
     }
 
     fn stride(&self) -> u32 {

@@ -96,8 +96,8 @@ fn a_delay_prolongs_the_action_in_progress_by_its_cycles() {
     }
     let total = run_by_cycle.metrics().total;
     assert!(total.delayed_cycles > 0, "{total:?}");
-    let left = u64::from(run_by_cycle.state().progress.left(0));
-    let busy = u64::from(run_by_cycle.state().progress.busy(0));
+    let left = u64::from(run_by_cycle.state().action_progress.left(0));
+    let busy = u64::from(run_by_cycle.state().action_progress.busy(0));
     let before = total.delayed_cycles + total.actions + busy;
     assert!(before > 200, "some delays fell into actions");
     // Each action had three cycles without delay, but the last one, of which some are left.
@@ -196,7 +196,7 @@ fn looking_at_a_run_changes_nothing_and_says_how_long_an_action_goes_on() {
     let mut told_left = 0;
     for _ in 0..60 {
         let told = watched.inspect(BodyId::new(kinds::ROBOT, 3, None)).expect("it is there");
-        let left = watched.state().progress.left(3);
+        let left = watched.state().action_progress.left(3);
         let words = FactValue::number(f64::from(left), "cycles");
         assert_eq!(told.fact_value("Now", "action goes on for"), Some(&words));
         told_left += left;
