@@ -11,7 +11,8 @@ use std::path::PathBuf;
 /// The scenario, and the options that change it.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ScenarioArgs {
-    /// Scenario file (TOML, BlueSky .scn or recorded traffic .csv, .json, .parquet, .so6; gzip is fine)
+    /// Scenario file (TOML, BlueSky .scn or recorded traffic .csv, .json, .parquet, .so6,
+    /// problem of the Robot Runners .json; gzip is fine)
     #[arg(value_name = "SCENARIO")]
     pub(crate) file: PathBuf,
 

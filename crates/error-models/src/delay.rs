@@ -16,6 +16,9 @@ pub enum DelayEvent {
     Action,
     /// Each cycle, whether or not an action is due.
     Cycle,
+    /// Each cycle, for a section of robots together: how many delays start is drawn from a Poisson distribution with a mean
+    /// of the chance times the robots, and whom they meet from those that are not delayed.
+    Team,
 }
 
 impl DelayEvent {
@@ -24,6 +27,7 @@ impl DelayEvent {
         match self {
             Self::Action => "action",
             Self::Cycle => "cycle",
+            Self::Team => "team",
         }
     }
 }

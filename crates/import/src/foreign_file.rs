@@ -115,7 +115,7 @@ impl ForeignFormat {
             let remedy = "give the JSON file that names it as its `agentFile` or `taskFile`";
             return Err(InputError::new(path.display(), cause, remedy));
         }
-        if ROBOT_RUNNERS_KEYS.iter().all(|key| text.contains(key)) {
+        if lorr::begins_as_problem(&text) {
             return Ok(Some(Self::RobotRunners));
         }
         if is_mrclam_part(path, &text) {
@@ -180,8 +180,6 @@ const IMAGE_MAGICS: [&[u8]; 7] =
     [b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"II*\0", b"MM\0*", b"RIFF", b"BM"];
 /// The key of `metadata.yaml` by which it differs from the YAML file of a map.
 const BAG_METADATA_KEY: &str = "rosbag2_bagfile_information";
-/// Keys by which a problem of the League of Robot Runners is recognized.
-const ROBOT_RUNNERS_KEYS: [&str; 2] = ["\"mapFile\"", "\"agentFile\""];
 /// How the lists of such a problem begin.
 const ROBOT_RUNNERS_LIST: &str = "# version for LoRR";
 /// Messages with which logs of CARMEN begin, after comments.

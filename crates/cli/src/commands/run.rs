@@ -25,6 +25,7 @@ Examples:
   sidestep run office.toml --mcap office.mcap    for Foxglove and other viewers
   sidestep run office.toml --foxglove 127.0.0.1:8765    watch it there
   sidestep run tracks.csv              replay recorded traffic
+  sidestep run problem.json            a problem of the League of Robot Runners
 
 Without --out and --mcap nothing is written. The folder holds scenario.toml (complete), \
 summary.json, trajectories/ and events/ (Parquet), trajectories.svg and .png, and a checkpoint.";

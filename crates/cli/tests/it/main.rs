@@ -26,6 +26,7 @@ mod inspect;
 mod kills;
 mod learn;
 mod leftovers;
+mod lorr;
 mod names;
 mod output;
 mod own;

@@ -14,7 +14,7 @@ use keys::Keys;
 use lists::Lists;
 use sidestep_kernel::InputError;
 use sidestep_map::{Cell, GridMap};
-use sidestep_scenario::file::read_text;
+use sidestep_scenario::file::{read_start, read_text};
 use std::path::{Path, PathBuf};
 
 /// The most bytes of a problem or a list; the largest list of the start kit has 0.4 MB.
@@ -97,6 +97,28 @@ pub enum DurationModel {
         /// The standard deviation, in parts of the range.
         deviation_ratio: f64,
     },
+}
+
+/// Keys of which a problem has at least one near its start, however it is cut off.
+const TELLING_KEYS: [&str; 2] = ["\"mapFile\"", "\"agentFile\""];
+/// Number of bytes by which a problem is recognized.
+const START_BYTES: u64 = 4096;
+
+/// Returns whether a file is a problem, by its content.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn is_problem(path: &Path) -> Result<bool, InputError> {
+    if path.is_dir() {
+        return Ok(false);
+    }
+    Ok(begins_as_problem(&String::from_utf8_lossy(&read_start(path, START_BYTES)?)))
+}
+
+/// Returns whether a text begins as a problem does.
+pub(crate) fn begins_as_problem(text: &str) -> bool {
+    let is_object = text.trim_start_matches('\u{feff}').trim_start().starts_with('{');
+    is_object && TELLING_KEYS.iter().any(|key| text.contains(key))
 }
 
 /// Reads a problem with the files that it names, plain or with gzip.

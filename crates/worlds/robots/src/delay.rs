@@ -8,6 +8,8 @@ use sidestep_kernel::{AtomicColumn, EntityId};
 #[derive(Debug)]
 pub(crate) struct Delays {
     start: Bernoulli,
+    /// The chance of `start`.
+    p: f64,
     per: DelayEvent,
     /// The lengths by the number that `duration` draws.
     cycles: Vec<u32>,
@@ -21,6 +23,7 @@ impl Delays {
         let duration = Categorical::new(&row).ok()?;
         (model.p > 0.0).then(|| Self {
             start: Bernoulli::new(model.p),
+            p: model.p,
             per: model.per,
             cycles: model.durations.iter().map(|duration| duration.cycles).collect(),
             duration,
@@ -33,12 +36,24 @@ impl Delays {
             DelayEvent::Cycle => true,
             // The action that comes after a delay has had its draw.
             DelayEvent::Action => is_due && pause == 0,
+            // Drawn before the cycle, see `team_delays.rs`.
+            DelayEvent::Team => false,
         }
+    }
+
+    /// Returns the chance that a robot of a section has for each delay of a cycle, where those are drawn together.
+    pub(crate) fn team_chance(&self) -> Option<f64> {
+        (self.per == DelayEvent::Team).then_some(self.p)
+    }
+
+    /// Returns the length of a delay by this draw.
+    pub(crate) fn sample_length(&self, duration: u32) -> u32 {
+        self.cycles[self.duration.sample(duration)]
     }
 
     /// Returns the length of the delay that starts by these draws, 0 for none.
     pub(crate) fn sample(&self, [start, duration, ..]: [u32; 4]) -> u32 {
-        if self.start.sample(start) { self.cycles[self.duration.sample(duration)] } else { 0 }
+        if self.start.sample(start) { self.sample_length(duration) } else { 0 }
     }
 }
 
@@ -65,6 +80,11 @@ impl DelayColumns {
         self.pause.add(id, 1);
         self.total.add(id, 1);
         self.missed.add(id, u32::from(is_due));
+    }
+
+    /// Starts a delay before a cycle.
+    pub(crate) fn start(&self, id: EntityId, cycles: u32) {
+        self.remaining.set(id as usize, cycles);
     }
 
     /// Ends the pause before an action.

@@ -32,6 +32,7 @@ mod errands;
 pub mod exact;
 mod external;
 mod facts;
+mod import;
 mod inspect;
 mod join;
 pub mod kinds;
@@ -51,6 +52,7 @@ mod simultaneous;
 pub mod state;
 mod table_notes;
 mod team;
+mod team_delays;
 mod team_words;
 mod text;
 mod view;
@@ -229,7 +231,7 @@ impl Phases for RobotsWorld {
     }
 
     fn has_plan(&self) -> bool {
-        !self.planner_teams.is_empty() || self.has_long_actions
+        !self.planner_teams.is_empty() || self.has_long_actions || !self.delay_teams.is_empty()
     }
 
     fn plan(phase: &mut PhaseContext<'_, Self>) {

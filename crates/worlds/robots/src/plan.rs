@@ -38,9 +38,11 @@ impl RobotsWorld {
         states.into()
     }
 
-    /// Plans for each team whose robots are due, after bodies have given up what they left.
+    /// Plans for each team whose robots are due, after bodies have given up what they left, and delays have
+    /// started that are drawn together.
     pub(crate) fn plan(&self, state: &RobotsState, now: Cycle) {
         state.release_boxes(self);
+        self.start_team_delays(state, now);
         for (team, team_state) in self.planner_teams.iter().zip(&state.planner_teams) {
             if self.bodies[team.robots.start as usize].is_due(now) {
                 self.plan_team(state, team, team_state);

@@ -19,6 +19,7 @@ use sidestep_kernel::space::GridPosition;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::{GridMap, Rect};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Boxes of a beam that are read together, even past a wall: four loads and one branch cost less than a branch
@@ -123,6 +124,8 @@ pub struct RobotsWorld {
     pub(super) has_requests: bool,
     /// Whether there are robots that may be delayed.
     pub(super) has_delays: bool,
+    /// The sections of robots whose delays are drawn together.
+    pub(super) delay_teams: Vec<Range<EntityId>>,
     /// Whether there are robots whose actions take several cycles.
     pub(super) has_long_actions: bool,
     /// The order in which states store the bodies.

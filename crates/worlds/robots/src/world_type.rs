@@ -2,13 +2,13 @@
 
 use super::decide::Behaviour;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
-use super::{RobotsWorld, bundle, remarks, text};
+use super::{RobotsWorld, bundle, import, remarks, text};
 use sidestep_kernel::text::JsonTextReport;
 use sidestep_kernel::view::BodyKind;
 use sidestep_kernel::{InputError, RunConfig, Simulation, World};
 use sidestep_scenario::{
-    CompiledScenario as AnyCompiled, Editing, ImportReport, MetricInfo, Remark, ResolvedScenario,
-    SeedEffect, Source, WorldFacts, WorldType,
+    CompiledScenario as AnyCompiled, Editing, ImportOptions, ImportReport, ImportedScenario,
+    MetricInfo, Remark, ResolvedScenario, SeedEffect, Source, WorldFacts, WorldType,
 };
 use std::any::Any;
 use std::path::Path;
@@ -91,6 +91,14 @@ impl WorldType for Robots {
 
     fn editing(&self) -> Editing {
         super::facts::editing()
+    }
+
+    fn import_scenario(
+        &self,
+        file: &Path,
+        _: &ImportOptions,
+    ) -> Result<Option<ImportedScenario>, InputError> {
+        import::import_file(file)
     }
 
     fn compile(&self, source: &Source) -> Result<Box<dyn AnyCompiled>, InputError> {

@@ -213,6 +213,7 @@ impl<'a> Compiler<'a> {
         let radio = self.radio();
         let has_requests = self.has_requests();
         let has_delays = self.has_delays();
+        let delay_teams = self.delay_teams(&placer);
         let has_long_actions = placer.groups.iter().any(|group| group.action_cycles > 1);
         let kind_rank = self.kind_rank()?;
         let planner_teams = placer.planner_teams();
@@ -235,6 +236,7 @@ impl<'a> Compiler<'a> {
             stops_at_gridlock: self.file.stop.gridlock,
             has_requests,
             has_delays,
+            delay_teams,
             has_long_actions,
             storage: order,
             streams: self.streams,
@@ -280,7 +282,6 @@ impl<'a> Compiler<'a> {
         self.map.width() + 2 * self.border
     }
 
-    /// Returns whether some robots ask each other to make room.
     fn has_delays(&self) -> bool {
         self.types.iter().any(|ty| match &ty.role {
             Role::Robot(model) => model.body.delays.is_some(),
@@ -288,6 +289,20 @@ impl<'a> Compiler<'a> {
         })
     }
 
+    /// Returns the sections of robots whose delays are drawn together.
+    fn delay_teams(&self, placer: &Placer) -> Vec<Range<EntityId>> {
+        let mut teams = Vec::new();
+        for (group, first) in placer.groups.iter().zip(placer.first_ids()) {
+            let Some(ty) = group.first_type().filter(|_| group.count > 0) else { continue };
+            let Role::Robot(model) = &self.types[usize::from(ty)].role else { continue };
+            if model.body.delays.as_ref().is_some_and(|delays| delays.team_chance().is_some()) {
+                teams.push(first..first + group.count as EntityId);
+            }
+        }
+        teams
+    }
+
+    /// Returns whether some robots ask each other to make room.
     fn has_requests(&self) -> bool {
         self.types.iter().any(|ty| match &ty.role {
             Role::Robot(model) => model.behaviour.has_requests(),

@@ -22,6 +22,16 @@ pub(super) struct BodyGroup {
     pub(super) tasks: Option<Arc<TeamTasks>>,
 }
 
+impl BodyGroup {
+    /// Returns the type of its first body.
+    pub(super) fn first_type(&self) -> Option<u16> {
+        match &self.ty {
+            GroupTypes::Shared(ty) => Some(*ty),
+            GroupTypes::PerBody(types) => types.first().copied(),
+        }
+    }
+}
+
 /// One type for all of a group, or one for each body where goals or phases are its own.
 #[derive(Debug)]
 pub(super) enum GroupTypes {
