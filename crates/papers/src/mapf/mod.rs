@@ -205,7 +205,7 @@ impl MapResults {
     fn table(&self) -> Table {
         let note = "Sensors are right but for `alone, sensors err`. Planners know all places, and no robot that decides \
                     alone does: that is a bound, not an equal.";
-        COLUMNS.table(&format!("The map `{}`", self.map), note, &self.cases)
+        COLUMNS.table(&format!("Map {}", self.map), note, &self.cases)
     }
 
     /// Throughput of each method by wheels.
@@ -217,7 +217,7 @@ impl MapResults {
         }
         let categories = ALL_WHEELS.map(String::from).to_vec();
         let labels = ["wheels", "trips in 1,000 robot-cycles"];
-        let title = format!("Throughput on the map `{}`, {robots} robots", self.map);
+        let title = format!("Throughput on map {}, {robots} robots", self.map);
         Figure { kind: FigureKind::Bars { categories }, ..figure(&title, labels, series) }
             .with_interval_note()
     }
