@@ -9,9 +9,9 @@ use crate::plan::Plan;
 use crate::pose::{Action, ActionModel, GridPose};
 use serde::{Deserialize, Serialize};
 
-/// Steps without progress of anybody after which a plan whose order is kept is given up: something that the plan does
-/// not know stands in the way. Longer than most delays of a robot, of which all behind it would make a new plan.
-const MAX_STALL_STEPS: u32 = 16;
+/// Actions' time without progress of anybody after which a plan whose order is kept is given up: something that the plan
+/// does not know stands in the way. Longer than most delays of a robot, of which all behind it would make a new plan.
+const MAX_STALL_ACTIONS: u32 = 16;
 
 /// The rule by which a plan is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -54,6 +54,8 @@ pub(crate) struct Execute<'a> {
     pub(crate) graph: &'a DependencyGraph,
     /// Whether an agent can enter a box that another one leaves in the same step.
     pub(crate) may_follow: bool,
+    /// Steps that an action takes.
+    pub(crate) action_steps: u32,
 }
 
 impl Execution {
@@ -71,11 +73,12 @@ impl Execution {
             Executor::Replan { every_steps, max_deviation } => {
                 self.step < every_steps && self.deviation(poses) <= max_deviation
             }
-            Executor::Adg => self.advance_in_order(by.graph, poses),
+            Executor::Adg => self.advance_in_order(by, poses),
         }
     }
 
-    fn advance_in_order(&mut self, graph: &DependencyGraph, poses: &[GridPose]) -> bool {
+    fn advance_in_order(&mut self, by: &Execute<'_>, poses: &[GridPose]) -> bool {
+        let graph = by.graph;
         self.stall_steps += 1;
         for (agent, (&pose, progress)) in poses.iter().zip(&mut self.progress).enumerate() {
             let done = *progress as usize;
@@ -93,7 +96,8 @@ impl Execution {
             }
         }
         // Whoever has no action left cannot make progress.
-        self.stall_steps < MAX_STALL_STEPS || self.is_complete(graph)
+        let max_stall_steps = MAX_STALL_ACTIONS.saturating_mul(by.action_steps.max(1));
+        self.stall_steps < max_stall_steps || self.is_complete(graph)
     }
 
     fn is_complete(&self, graph: &DependencyGraph) -> bool {

@@ -44,6 +44,9 @@ pub struct LacamConfig {
     pub budget_expansions: u64,
     /// Whether it ends with the first plan.
     pub is_first_enough: bool,
+    /// Whether agents may go in circles, each into the box of the next: bodies that hold the boxes that they leave cannot.
+    /// Without circles, what the search says of plans that do not exist is of plans without them.
+    pub may_rotate: bool,
     /// The seed of the draws between equal boxes.
     pub seed: Seed,
 }
@@ -54,6 +57,7 @@ impl Default for LacamConfig {
             objective: Objective::SumOfLoss,
             budget_expansions: 10_000,
             is_first_enough: false,
+            may_rotate: true,
             seed: Seed(0),
         }
     }
@@ -132,7 +136,8 @@ impl<'a> Search<'a> {
         let mut search = Self {
             instance,
             config,
-            engine: Inheritance::new(graphs, instance.model(), CACHE_BYTES),
+            engine: Inheritance::new(graphs, instance.model(), CACHE_BYTES)
+                .with_circles(config.may_rotate),
             distances: instance.distances()?,
             streams: Streams::new(config.seed),
             configurations: Vec::new(),

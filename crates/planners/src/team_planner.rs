@@ -58,7 +58,8 @@ pub struct TeamPlannerConfig {
     pub window: Option<u32>,
     /// Whether an agent can enter a box that another one leaves in the same step.
     pub may_follow: bool,
-    /// Steps that an action takes, of [`Method::Pibt`]; other methods plan for actions of one step.
+    /// Steps that an action takes, in which a body also holds the boxes that it leaves. Above 1 agents get out of step, so
+    /// only [`Method::Pibt`] and [`Executor::Adg`] lead them well.
     pub action_steps: u32,
     /// The seed of all draws.
     pub seed: Seed,
@@ -257,6 +258,7 @@ impl TeamPlanner {
             model: ActionModel::Turns,
             graph,
             may_follow: self.config.may_follow,
+            action_steps: self.config.action_steps,
         }
     }
 
@@ -322,7 +324,9 @@ impl TeamPlanner {
             Method::Lacam { budget_expansions } => {
                 // Each search has its own draws, so that one after a failure is another one.
                 let seed = Seed(self.config.seed.0.wrapping_add(counts.plans));
-                let config = LacamConfig { budget_expansions, seed, ..LacamConfig::default() };
+                let may_rotate = self.config.action_steps <= 1;
+                let config =
+                    LacamConfig { budget_expansions, seed, may_rotate, ..LacamConfig::default() };
                 let outcome = lacam::plan(instance, config)?;
                 Ok((outcome.plan, outcome.expansions))
             }

@@ -152,8 +152,8 @@ pub struct BodyRecord {
     /// the cycles left, those since the last action, those in all, and the turns missed. They stand here so that
     /// checkpoints of worlds without delays do not depend on them. For the same reason, where some actions take several
     /// cycles, five words of the body's action follow: the cycles left, the anchor before it, its walk, the steps made,
-    /// and the cycles in which actions went on in all. Of a robot that a planner leads, the words that this remembers of
-    /// it come last, and those of its task after them.
+    /// and the cycles in which actions went on in all. Of a robot that a planner leads, the
+    /// words of its task come then, and last those that the planner remembers of it.
     pub contacts: Vec<u32>,
 }
 

@@ -105,6 +105,26 @@ fn tasks_are_the_same_bits_on_any_number_of_workers_in_any_storage_and_resumed()
 }
 
 #[test]
+fn whole_plans_carry_tasks_out_and_are_the_same_when_resumed_in_the_midst_of_actions() {
+    for planner in
+        ["lacam\", budget_expansions = 100, window = 30, executor = \"adg", "prioritized"]
+    {
+        let text = shelves("nearest").replace("method = \"pibt", &format!("method = \"{planner}"));
+        let mut whole = run(&text);
+        whole.advance(400);
+        let metrics = whole.metrics();
+        assert!(metrics.tasks_finished > 10, "{planner}: {}", metrics.tasks_finished);
+        assert!(metrics.plans > metrics.plan_failures, "{planner}: {}", metrics.plans);
+        let mut first = run(&text);
+        first.advance(100);
+        let mut resumed = run_in_order(&text, 2, StorageOrder::Spatial);
+        resumed.restore(&first.checkpoint()).expect("fits");
+        resumed.advance(300);
+        assert_eq!(resumed.digest(), whole.digest(), "{planner}");
+    }
+}
+
+#[test]
 fn looking_at_a_robot_with_tasks_changes_nothing() {
     let mut watched = run(&shelves("nearest"));
     let mut unwatched = run(&shelves("nearest"));

@@ -196,14 +196,13 @@ impl Compiler<'_> {
             let remedy = "add phase = 0, because a team acts in the same cycles";
             return Err(self.source.error(span.clone(), cause, remedy));
         }
-        let is_stepwise =
-            s.planner.as_ref().is_some_and(|p| p.get_ref().method == PlannerMethod::Pibt);
-        if action_cycles(s) > 1 && !is_stepwise {
+        let executor = s.planner.as_ref().and_then(|planner| planner.get_ref().executor.as_ref());
+        let by_clock = executor.filter(|executor| *executor.get_ref() != PlanExecutor::Adg);
+        if let Some(executor) = by_clock.filter(|_| action_cycles(s) > 1) {
             let cause =
-                "whole plans are of actions that take one cycle, and action_cycles is above 1";
-            let remedy =
-                "give method = \"pibt\", which plans step by step, or leave out `action_cycles`";
-            return Err(self.source.error(span.clone(), cause, remedy));
+                "robots whose actions take several cycles get out of step with the clock of a plan";
+            let remedy = "give executor = \"adg\", or leave out `action_cycles`";
+            return Err(self.source.error(executor.span(), cause, remedy));
         }
         for (action, path, turn) in PLANNED_TRANSITIONS {
             let action = usize::from(action);
@@ -298,8 +297,10 @@ mod tests {
         let avoids = GOES.replace(" }", ", avoidance = \"touch\" }");
         assert_refused(&format!("{avoids}{planner}"), "`avoidance`", "leave out `avoidance`");
         assert_refused(&format!("{GOES}{planner}period = 3\n"), "drawn", "phase = 0");
-        let whole = planner.replace("pibt", "lacam");
-        assert_refused(&format!("{GOES}{whole}action_cycles = 2\n"), "take one cycle", "pibt");
+        let whole = planner.replace("\"pibt\"", "\"lacam\", executor = \"adg\"");
+        assert!(compiled(&format!("{GOES}{whole}action_cycles = 2\n")).is_ok());
+        let blind = whole.replace("adg", "blind");
+        assert_refused(&format!("{GOES}{blind}action_cycles = 2\n"), "out of step", "adg");
         let unknown = "planner = { method = \"astar\" }\n";
         let error = compiled(&format!("{GOES}{unknown}")).map(|_| ()).expect_err(unknown);
         assert!(error.to_string().contains("pibt"), "{error}");
