@@ -13,6 +13,7 @@ mod distributions;
 mod exactness;
 mod examples;
 mod frames;
+mod gridlock;
 mod inspect;
 mod kinds;
 mod laws;

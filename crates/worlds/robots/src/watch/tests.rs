@@ -219,6 +219,22 @@ fn a_run_ends_at_its_first_gridlock_where_the_scenario_asks_for_it() {
 }
 
 #[test]
+fn a_gridlock_does_not_depend_on_the_number_of_workers() {
+    let text = rows_head_on("[\"sonar-ring\"]", "plan");
+    let text = format!("format = 1\nworld = \"robots\"\nregime = \"both\"\n{text}");
+    let of_workers = |workers| {
+        let mut run = robots_run(&Source::new("s", &text, ""), workers).expect("fits");
+        run.force_parallel();
+        run.advance(1500);
+        run.snapshot()
+    };
+    let alone = of_workers(1);
+    assert!(alone.progress.gridlocks_begun() > 0);
+    assert_eq!(of_workers(2), alone);
+    assert_eq!(of_workers(3), alone);
+}
+
+#[test]
 fn what_ends_a_run_is_in_its_digest() {
     let text = format!("{HEAD_ON}[stop]\ngridlock = true\n");
     let mut run = run(&text);

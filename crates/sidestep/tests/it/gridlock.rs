@@ -1,0 +1,27 @@
+//! Robots that flow are in no gridlock: the shipped scenarios with robots that go somewhere.
+
+use sidestep::kernel::Simulation;
+use sidestep::scenario::Source;
+use sidestep::worlds::robots::robots_run;
+
+/// Those in which no trip is made would say nothing.
+const FLOWING: [(&str, &str); 5] = [
+    ("corridor", include_str!("../../../../scenarios/robots/corridor.toml")),
+    ("crossing", include_str!("../../../../scenarios/robots/crossing.toml")),
+    ("default", include_str!("../../../../scenarios/robots/default.toml")),
+    ("office", include_str!("../../../../scenarios/robots/office.toml")),
+    ("planner", include_str!("../../../../scenarios/robots/planner.toml")),
+];
+
+#[test]
+fn shipped_scenarios_in_which_robots_arrive_have_no_gridlock() {
+    for (name, text) in FLOWING {
+        let mut run = robots_run(&Source::new(name, text, ""), 1).expect("a shipped scenario");
+        run.advance(6000);
+        let before = run.metrics().total.trips;
+        run.advance(2000);
+        let metrics = run.metrics();
+        assert!(metrics.total.trips > before, "{name}: {metrics:?}");
+        assert_eq!((metrics.gridlocks, metrics.first_gridlock_cycle), (0, None), "{name}");
+    }
+}
