@@ -95,3 +95,15 @@ fn a_rehearsal_of_the_airspace_experiments_measures_over_sockets_or_says_how_to(
         assert!(fleet["elapsed_s"].as_f64() > Some(0.0), "{case}");
     }
 }
+
+#[test]
+fn a_rehearsal_of_the_study_of_planners_leaves_a_whole_report() {
+    let place = TestFolder::new();
+    let told = place.json(&["reproduce", "mapf", "--quick", "--seeds", "1", "--out", "m"]);
+    assert_eq!(told["claims"].as_array().map(Vec::len), Some(7));
+    assert_eq!(names(&place.path("m")), WHOLE);
+    let report = place.read("m/report.md");
+    assert!(report.contains("A rehearsal") && !report.contains("NaN"), "{report}");
+    let figures = names(&place.path("m/figures"));
+    assert_eq!(figures.iter().filter(|name| name.ends_with(".png")).count(), 5, "{figures:?}");
+}

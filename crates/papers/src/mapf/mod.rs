@@ -98,6 +98,8 @@ const COLUMNS: Columns = Columns {
     results: &[
         column("throughput", "trips in 1,000 robot-cycles", Summary::Computed(mean_throughput)),
         column("contacts_per_action", "contacts per action", Summary::Mean("contacts_per_action")),
+        column("waiting_share", "share of turns waited", Summary::Mean("waiting_share")),
+        column("gridlocks", "runs with a gridlock", Summary::Share("gridlocks")),
         column("off_plan", "times off the plan", Summary::Mean("off_plan")),
         column("plans", "plans", Summary::Mean("plans")),
         column("plan_failures", "without a plan", Summary::Mean("plan_failures")),
