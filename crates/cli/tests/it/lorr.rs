@@ -54,7 +54,6 @@ fn a_problem_is_run_checked_recorded_and_verified() {
     let other = place.json(&["run", "p.json", "--cycles", "600", "--seed", "5"]);
     assert_ne!(other["digest"], json["digest"]);
     assert_eq!(place.run(&["verify", "r"]).code(), 0);
-    assert_eq!(place.run(&["resume", "r", "--cycles", "900"]).code(), 0);
 }
 
 #[test]
@@ -93,8 +92,8 @@ fn what_is_wrong_in_a_problem_is_told_with_its_place_and_a_remedy() {
     assert_refused(&outside, "p.json", "m.agents:4:1", "`32` is no location", "0 to 31");
     let unreachable = problem_folder(AGENTS, TASKS);
     unreachable
-        .write("maps/m.map", MAP.replace(".T....@@", ".T..@@@.").replace("....@...", "....@..@"));
-    unreachable.write("tasks/m.tasks", TASKS.replace("28", "31"));
+        .write("maps/m.map", MAP.replace(".T....@@", ".T....@.").replace("....@...", "....@..@"));
+    unreachable.write("tasks/m.tasks", TASKS.replace("23", "22").replace("28", "31"));
     assert_refused(
         &unreachable,
         "p.json",

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 use sidestep_import::lorr::{self, Delays, DurationModel, EventModel, Problem};
+use sidestep_import::report::Finding;
 use sidestep_import::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 use sidestep_kernel::math::erfc;
@@ -27,7 +28,8 @@ pub(super) fn import_file(file: &Path) -> Result<Option<ImportedScenario>, Input
     record_choices(&problem, &mut report);
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let json = json!({ "import_report": report });
-    let lines = report.lines();
+    let mut lines = report.lines();
+    lines.extend(report.findings.iter().map(Finding::line));
     Ok(Some(ImportedScenario { scenario: Ok(scenario(&name, &problem)), report, json, lines }))
 }
 

@@ -7,7 +7,7 @@
 //! ```text
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
-//! plan.rs: before a cycle, the planners of teams (team.rs)      action_progress.rs: actions of several cycles
+//! plan.rs: before a cycle, the planners of teams (team.rs)      action_progress.rs, long_action.rs: actions of several cycles
 //! errands.rs: the tasks of teams
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio          watch/: who comes nearer to its goal, and gridlocks
@@ -36,6 +36,7 @@ mod import;
 mod inspect;
 mod join;
 pub mod kinds;
+mod long_action;
 mod metric_info;
 pub mod metrics;
 mod odometry;

@@ -24,6 +24,12 @@ pub(super) fn summary_lines(metrics: &Metrics) -> KeyValues {
     if metrics.plans > 0 {
         lines.push(key_value_pair("plans", plans(metrics)));
     }
+    // A team with tasks always knows some.
+    if metrics.tasks_open > 0 {
+        let open = group_thousands(metrics.tasks_open);
+        let finished = group_thousands(metrics.tasks_finished);
+        lines.push(key_value_pair("tasks finished", format!("{finished}, {open} open")));
+    }
     // Nothing to report where no two bodies ever met.
     if metrics.largest_group > 0 {
         lines.push(key_value_pair("conflict groups", groups(metrics)));
@@ -238,6 +244,7 @@ fn robot_section(section: &Value) -> Value {
         "count": value_or(&section["count"], places.unwrap_or(Value::Null)),
         "size_boxes": value_or(&section["size"], 1.into()),
         "period": value_or(&section["period"], 1.into()),
+        "action_cycles": value_or(&section["action_cycles"], 1.into()),
         "sensors": value_or(&section["sensors"], json!([])),
         "effector": value_or(&section["effector"], "perfect".into()),
         "behaviour": value_or(&section["behaviour"]["kind"], default_behaviour.into()),
@@ -336,8 +343,12 @@ fn robots_text(robots: &Value) -> String {
     let sensors = if names.is_empty() { "no sensor".into() } else { names.join(" + ") };
     let count =
         if robots["count"].is_null() { "as listed".into() } else { number(&robots["count"]) };
+    let actions = match &robots["action_cycles"] {
+        Value::Number(n) if n.as_u64() == Some(1) => String::new(),
+        n => format!(", {n} cycles an action"),
+    };
     format!(
-        "{count} of {size} x {size} boxes: {sensors}, effector {}, {}, every {}",
+        "{count} of {size} x {size} boxes: {sensors}, effector {}, {}, every {}{actions}",
         unquoted(&robots["effector"]),
         unquoted(&robots["behaviour"]),
         match &robots["period"] {
