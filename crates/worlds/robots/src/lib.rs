@@ -54,6 +54,7 @@ pub mod state;
 mod table_notes;
 mod team;
 mod team_delays;
+mod team_memory;
 mod team_words;
 mod text;
 mod view;

@@ -1,5 +1,6 @@
 //! The teams that planners lead: their robots, and what a planner remembers of them.
 
+use crate::team_memory::TeamMemory;
 use crate::team_words;
 use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
@@ -41,16 +42,6 @@ pub(crate) struct TaskMemory {
     /// No result depends on what it remembers, so copies of a state share it.
     pub(crate) dispatcher: Arc<Mutex<Dispatcher>>,
     pub(crate) state: TaskState,
-}
-
-/// All that the planner of a team remembers.
-#[derive(Debug, Clone)]
-pub(crate) struct TeamMemory {
-    pub(crate) planner: TeamPlannerState,
-    /// The pose that each robot has after its planned action; none before the first.
-    pub(crate) planned: Vec<Option<GridPose>>,
-    /// Times that each robot was elsewhere than planned.
-    pub(crate) off_plan: Vec<u32>,
 }
 
 /// Locks a value. A poisoned lock is fine: after a panic nothing of the run is read.
@@ -130,15 +121,5 @@ impl TeamState {
     /// Returns what became of the plans so far.
     pub(crate) fn counts(&self) -> PlanCounts {
         lock(&self.memory).planner.counts
-    }
-}
-
-impl TeamMemory {
-    /// Counts the robots that are elsewhere than planned.
-    pub(crate) fn compare(&mut self, poses: &[GridPose]) {
-        for (robot, &pose) in poses.iter().enumerate() {
-            let is_off = self.planned[robot].is_some_and(|planned| planned != pose);
-            self.off_plan[robot] += u32::from(is_off);
-        }
     }
 }

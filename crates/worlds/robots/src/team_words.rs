@@ -7,7 +7,7 @@
 //! | steps of the plan so far, steps without progress | robot 0 where there is a plan |
 //! | actions done, place and heading at its start, number of actions, the actions by 16 | each robot where there is a plan |
 
-use crate::team::TeamMemory;
+use crate::team_memory::TeamMemory;
 use sidestep_planners::{Action, Execution, GridPose, Plan, PlanCounts};
 
 /// Actions by their numbers in a word, two bits each.
