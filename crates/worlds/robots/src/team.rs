@@ -6,8 +6,7 @@ use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
 use sidestep_planners::tasks::TaskState;
 use sidestep_planners::{
-    Dispatcher, GridPose, Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState,
-    TeamTasks,
+    Dispatcher, Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState, TeamTasks,
 };
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
