@@ -310,7 +310,7 @@ pub(super) struct RobotSection {
 #[serde(deny_unknown_fields)]
 pub(super) struct TaskSection {
     /// The errands of each task, one after the other: [[[column, row], ...], ...].
-    pub(super) list: Option<Vec<Spanned<Vec<(u32, u32)>>>>,
+    pub(super) list: Option<Vec<Spanned<Errands>>>,
     /// A list of tasks of the League of Robot Runners.
     pub(super) file: Option<Spanned<PathBuf>>,
     /// Tasks that are known and not finished at any time, for each robot.
@@ -319,6 +319,9 @@ pub(super) struct TaskSection {
     #[serde(default)]
     pub(super) policy: TaskPolicyName,
 }
+
+/// Columns and rows of the places of one task.
+type Errands = Vec<(u32, u32)>;
 
 /// How tasks are given to robots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
