@@ -95,9 +95,13 @@ impl Execution {
                 return false;
             }
         }
-        // Whoever has no action left cannot make progress.
+        !self.is_stalled(by)
+    }
+
+    /// Returns whether nobody has made progress for too long. Whoever has no action left cannot make any.
+    pub(crate) fn is_stalled(&self, by: &Execute<'_>) -> bool {
         let max_stall_steps = MAX_STALL_ACTIONS.saturating_mul(by.action_steps.max(1));
-        self.stall_steps < max_stall_steps || self.is_complete(graph)
+        self.stall_steps >= max_stall_steps && !self.is_complete(by.graph)
     }
 
     fn is_complete(&self, graph: &DependencyGraph) -> bool {

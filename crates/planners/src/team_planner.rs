@@ -17,9 +17,9 @@ use std::collections::{BTreeSet, VecDeque};
 use std::ops::AddAssign;
 use std::sync::Arc;
 
-/// Steps by priority inheritance after a search without a plan, before the next one: the agents have to be elsewhere for
-/// another outcome, and a search that spends its budget takes long.
-const STEPS_WITHOUT_PLAN: u64 = 8;
+/// Actions' time by priority inheritance after a search without a plan, or a plan that came to a halt, before the next
+/// search: the agents have to be elsewhere for another outcome, and a search that spends its budget takes long.
+const ACTIONS_WITHOUT_PLAN: u64 = 8;
 
 /// The algorithm by which a team plans.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -204,8 +204,12 @@ impl TeamPlanner {
             let graph = state.graph.take().or_else(|| self.graph_of(&execution.plan).map(Arc::new));
             let goes_on = graph.as_ref().is_some_and(|graph| {
                 let by = self.execute(graph);
-                execution.advance(&by, now.poses)
-                    && !self.is_stale(execution, &by, &state.pibt.goals, now)
+                let goes_on = execution.advance(&by, now.poses);
+                if execution.is_stalled(&by) {
+                    // From where the agents stand, the same plan might be made again.
+                    state.next_search = state.pibt.step + self.steps_without_plan();
+                }
+                goes_on && !self.is_stale(execution, &by, &state.pibt.goals, now)
             });
             if goes_on {
                 state.graph = graph;
@@ -222,13 +226,18 @@ impl TeamPlanner {
         let graph = outcome.plan.as_ref().and_then(|plan| self.graph_of(plan));
         let (Some(plan), Some(graph)) = (outcome.plan, graph) else {
             state.counts.failures += 1;
-            state.next_search = state.pibt.step + STEPS_WITHOUT_PLAN;
+            state.next_search = state.pibt.step + self.steps_without_plan();
             return;
         };
         state.counts.costs += outcome.costs;
         state.counts.bounds += outcome.bound;
         state.execution = Some(Execution::new(plan));
         state.graph = Some(Arc::new(graph));
+    }
+
+    /// Returns the steps by priority inheritance before the next search.
+    fn steps_without_plan(&self) -> u64 {
+        ACTIONS_WITHOUT_PLAN * u64::from(self.config.action_steps.max(1))
     }
 
     /// Returns whether goals ask for another plan.

@@ -108,7 +108,8 @@ const SHORT_LEASE_S: u64 = 5;
 
 #[test]
 fn a_fleet_that_is_suspended_for_longer_than_its_lease_comes_out_as_in_one_process() {
-    let text = superconflict(3, "compact-team", 60, "");
+    // So many that the flight is not over before it is first seen to be under way.
+    let text = superconflict(3, "compact-team", 400, "");
     let folder = folder(&text);
     let mut job = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
     job.common.lease_s = SHORT_LEASE_S as f64;

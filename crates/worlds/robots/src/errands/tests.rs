@@ -111,7 +111,8 @@ fn whole_plans_carry_tasks_out_and_are_the_same_when_resumed_in_the_midst_of_act
     {
         let text = shelves("nearest").replace("method = \"pibt", &format!("method = \"{planner}"));
         let mut whole = run(&text);
-        whole.advance(400);
+        // Plans are made anew at each errand that is done, so the robots are slower than step by step.
+        whole.advance(1200);
         let metrics = whole.metrics();
         assert!(metrics.tasks_finished > 10, "{planner}: {}", metrics.tasks_finished);
         assert!(metrics.plans > metrics.plan_failures, "{planner}: {}", metrics.plans);
@@ -119,7 +120,7 @@ fn whole_plans_carry_tasks_out_and_are_the_same_when_resumed_in_the_midst_of_act
         first.advance(100);
         let mut resumed = run_in_order(&text, 2, StorageOrder::Spatial);
         resumed.restore(&first.checkpoint()).expect("fits");
-        resumed.advance(300);
+        resumed.advance(1100);
         assert_eq!(resumed.digest(), whole.digest(), "{planner}");
     }
 }
