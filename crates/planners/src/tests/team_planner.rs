@@ -142,7 +142,7 @@ proptest! {
                     other.poses.clone_from(&team.poses);
                     kept = Some(other);
                 }
-                let slips = |agent: usize| streams.block(agent as u32, step, SLIPS, 0)[0] % 5 == 0;
+                let slips = |agent: usize| streams.block(agent as u32, step, SLIPS, 0)[0].is_multiple_of(5);
                 team.step(slips);
                 if let Some(other) = &mut kept {
                     other.step(slips);
