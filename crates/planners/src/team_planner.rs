@@ -217,7 +217,8 @@ impl TeamPlanner {
             }
             state.execution = None;
         }
-        if state.pibt.step < state.next_search {
+        let is_spent = matches!(self.config.method, Method::Given(_)) && state.counts.plans > 0;
+        if state.pibt.step < state.next_search || is_spent {
             return;
         }
         let outcome = self.search(&state.counts, now);
