@@ -108,8 +108,8 @@ const SHORT_LEASE_S: u64 = 5;
 
 #[test]
 fn a_fleet_that_is_suspended_for_longer_than_its_lease_comes_out_as_in_one_process() {
-    // So many that the flight is not over before it is first seen to be under way.
-    let text = superconflict(3, "compact-team", 400, "");
+    // So long that it is seen under way before it is over.
+    let text = wide(&superconflict(3, "compact-team", 2000, ""), 8_000);
     let folder = folder(&text);
     let mut job = job(folder.path(), Topology::Mesh, ClockMode::Lockstep);
     job.common.lease_s = SHORT_LEASE_S as f64;
