@@ -14,6 +14,7 @@ use sidestep_kernel::InputError;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap, HashSet};
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// Conflicts of a node that are tried, to find one that raises the cost in both ways.
 const MAX_TRIALS: usize = 4;
@@ -79,7 +80,7 @@ struct TreeNode {
 
 struct Search<'a> {
     instance: &'a Instance,
-    distances: Vec<Rc<GoalDistances>>,
+    distances: &'a [Arc<GoalDistances>],
     nodes: Vec<TreeNode>,
     /// Nodes by cost, then by the number of conflicts, then the oldest first.
     open: BinaryHeap<(Reverse<u64>, Reverse<usize>, Reverse<u32>)>,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_map::planning::FreeSpace;
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::{Arc, OnceLock};
 
 /// An agent of a problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,6 +30,8 @@ pub struct Instance {
     graphs: Graphs,
     model: ActionModel,
     agents: Vec<Agent>,
+    /// Computed once: the bounds of a problem and its planner both need them.
+    distances: OnceLock<Vec<Arc<GoalDistances>>>,
 }
 
 impl Instance {
@@ -45,7 +47,7 @@ impl Instance {
     ) -> Result<Self, InputError> {
         check_sizes(agents.iter().map(|agent| agent.size))?;
         let graphs = Graphs::new(free, agents.iter().map(|agent| agent.size));
-        let instance = Self { graphs, model, agents };
+        let instance = Self { graphs, model, agents, distances: OnceLock::new() };
         instance.check_places("start", |agent| agent.start.position())?;
         instance.check_places("goal", |agent| agent.goal)?;
         for (index, agent) in instance.agents.iter().enumerate() {
@@ -96,14 +98,24 @@ impl Instance {
     }
 
     /// Returns the distances of each agent to its goal; agents with one goal and one size share them.
-    pub(crate) fn distances(&self) -> Result<Vec<Rc<GoalDistances>>, InputError> {
-        let mut known: BTreeMap<(usize, u32), Rc<GoalDistances>> = BTreeMap::new();
+    pub(crate) fn distances(&self) -> Result<&[Arc<GoalDistances>], InputError> {
+        if let Some(known) = self.distances.get() {
+            return Ok(known);
+        }
+        let distances = self.new_distances()?;
+        Ok(self.distances.get_or_init(|| distances))
+    }
+
+    fn new_distances(&self) -> Result<Vec<Arc<GoalDistances>>, InputError> {
+        let mut known: BTreeMap<(usize, u32), Arc<GoalDistances>> = BTreeMap::new();
         let mut all = Vec::new();
         for agent in 0..self.agents.len() {
             let goal = self.goal_box(agent);
             let distances = known
                 .entry((self.graphs.index_of(agent), goal))
-                .or_insert_with(|| Rc::new(GoalDistances::new(self.graph(agent), self.model, goal)))
+                .or_insert_with(|| {
+                    Arc::new(GoalDistances::new(self.graph(agent), self.model, goal))
+                })
                 .clone();
             if distances.steps(self.start_node(agent)) == GoalDistances::UNREACHABLE {
                 return Err(self.unreachable_goal(agent));

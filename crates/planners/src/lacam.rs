@@ -18,6 +18,7 @@ use sidestep_kernel::{InputError, Seed};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// Draws that decide between equal boxes, and the order of constraints.
 const TIES: Purpose = Purpose(3);
@@ -121,7 +122,7 @@ struct Search<'a> {
     instance: &'a Instance,
     config: LacamConfig,
     engine: Inheritance,
-    distances: Vec<Rc<GoalDistances>>,
+    distances: &'a [Arc<GoalDistances>],
     streams: Streams,
     configurations: Vec<Configuration>,
     known: BTreeMap<Rc<[u32]>, u32>,
@@ -336,7 +337,7 @@ impl<'a> Search<'a> {
     }
 
     fn bound(&self, nodes: &[u32]) -> u64 {
-        let steps = nodes.iter().zip(&self.distances).map(|(&node, d)| u64::from(d.steps(node)));
+        let steps = nodes.iter().zip(self.distances).map(|(&node, d)| u64::from(d.steps(node)));
         match self.config.objective {
             Objective::Makespan => steps.max().unwrap_or(0),
             Objective::SumOfLoss => steps.sum(),

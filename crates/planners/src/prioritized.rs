@@ -11,7 +11,7 @@ use crate::safe_intervals::{Query, Reservations, search};
 use sidestep_kernel::InputError;
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// What came of the attempts.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub fn plan(instance: &Instance, max_orders: u32) -> Result<PrioritizedOutcome, 
         }
         outcome.order = next;
         outcome.orders += 1;
-        match plan_in_order(instance, &distances, &outcome.order) {
+        match plan_in_order(instance, distances, &outcome.order) {
             Ok(plan) => {
                 outcome.plan = Some(plan);
                 outcome.blocked_agent = None;
@@ -68,7 +68,7 @@ fn put_first(order: &mut [usize], agent: usize) {
 /// Plans all agents in an order, or returns the first one that finds no path.
 fn plan_in_order(
     instance: &Instance,
-    distances: &[Rc<GoalDistances>],
+    distances: &[Arc<GoalDistances>],
     order: &[usize],
 ) -> Result<Plan, usize> {
     let boxes = instance.graphs().all().first().map_or(0, |graph| graph.len());

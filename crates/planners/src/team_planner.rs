@@ -3,7 +3,7 @@
 
 use crate::dependency_graph::DependencyGraph;
 use crate::executor::{Execute, Execution, Executor};
-use crate::graph::AnchorGraph;
+use crate::graph::{AnchorGraph, Graphs};
 use crate::instance::{Agent, Instance, check_sizes};
 use crate::lacam::{self, LacamConfig};
 use crate::pibt::{Obstructions, Pibt, PibtConfig, PibtState};
@@ -131,6 +131,7 @@ impl TeamPlannerState {
 #[derive(Debug, Clone)]
 pub struct TeamPlanner {
     free: FreeSpace,
+    graphs: Graphs,
     sizes: Vec<u32>,
     config: TeamPlannerConfig,
     pibt: Pibt,
@@ -171,7 +172,9 @@ impl TeamPlanner {
         let action_steps = config.action_steps;
         let pibt_config = PibtConfig { seed: config.seed, action_steps, ..PibtConfig::default() };
         let pibt = Pibt::new(free, sizes, pibt_config)?;
-        Ok(Self { free: free.clone(), sizes: sizes.to_vec(), config, pibt, actions: Vec::new() })
+        let graphs = Graphs::new(free, sizes.iter().copied());
+        let sizes = sizes.to_vec();
+        Ok(Self { free: free.clone(), graphs, sizes, config, pibt, actions: Vec::new() })
     }
 
     /// Returns the next action of each agent, and advances the state by one step.
@@ -363,8 +366,7 @@ impl TeamPlanner {
         for (agent, &pose) in now.poses.iter().enumerate() {
             let size = self.sizes[agent];
             if goals[agent].is_none() {
-                let graph = AnchorGraph::new(&self.free, size);
-                goals[agent] = floor.nearest(&graph, pose.position());
+                goals[agent] = floor.nearest(self.graphs.of(agent), pose.position());
                 goals[agent].iter().for_each(|&goal| {
                     floor.claim(goal, size);
                 });

@@ -35,7 +35,7 @@ pub struct MapfConfig {
 }
 
 impl Default for MapfConfig {
-    /// Half an hour on two processors, most of it for LaCAM*.
+    /// Some tens of minutes, most of them for LaCAM*.
     fn default() -> Self {
         let workers = available_workers();
         Self { seeds: 10, cycles: 800, robots: vec![20, 60], workers, quick: false }

@@ -56,6 +56,8 @@ mod team;
 mod team_delays;
 mod team_memory;
 mod team_words;
+#[cfg(test)]
+mod test_runs;
 mod text;
 mod view;
 mod watch;

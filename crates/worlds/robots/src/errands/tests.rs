@@ -3,6 +3,7 @@
 
 use crate::RobotsRun;
 use crate::scenario::{Behaviours, Compiled, StorageOrder};
+use crate::test_runs::run_in_order;
 use sidestep_kernel::Simulation;
 use sidestep_scenario::Source;
 
@@ -13,14 +14,6 @@ fn compile(
     let source = Source::new("test", text, "");
     let compiled = Compiled::new(&source, &Behaviours::new(), order)?;
     Ok((source, compiled))
-}
-
-/// A run that always uses all its workers.
-fn run_in_order(text: &str, workers: usize, order: StorageOrder) -> RobotsRun {
-    let (source, compiled) = compile(text, order).unwrap_or_else(|e| panic!("{e}"));
-    let mut run = compiled.start(&source, workers);
-    run.force_parallel();
-    run
 }
 
 fn run(text: &str) -> RobotsRun {

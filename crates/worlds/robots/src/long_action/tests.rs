@@ -2,6 +2,7 @@
 
 use crate::exact::single_robot;
 use crate::scenario::{Behaviours, Compiled, StorageOrder};
+use crate::test_runs::run_in_order;
 use crate::{RobotsRun, kinds};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::view::{BodyId, FactValue};
@@ -12,14 +13,6 @@ fn compiled(text: &str, order: StorageOrder) -> (Source, Compiled) {
     let compiled = Compiled::new(&source, &Behaviours::new(), order);
     let compiled = compiled.unwrap_or_else(|e| panic!("{e}"));
     (source, compiled)
-}
-
-/// A run that always uses all its workers.
-fn run_in_order(text: &str, workers: usize, order: StorageOrder) -> RobotsRun {
-    let (source, compiled) = compiled(text, order);
-    let mut run = compiled.start(&source, workers);
-    run.force_parallel();
-    run
 }
 
 fn run(text: &str) -> RobotsRun {

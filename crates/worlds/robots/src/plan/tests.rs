@@ -3,6 +3,7 @@
 use crate::RobotsRun;
 use crate::metrics::Metrics;
 use crate::scenario::{Behaviours, Compiled, StorageOrder};
+use crate::test_runs::run_in_order;
 use sidestep_kernel::stream::{Purpose, Streams};
 use sidestep_kernel::{CheckpointableWorld, Digest, Seed, Simulation};
 use sidestep_map::planning::FreeSpace;
@@ -42,15 +43,6 @@ p = 0.05
 min = 1
 max = 4
 "#;
-
-/// A run that always uses all its workers.
-fn run_in_order(text: &str, workers: usize, order: StorageOrder) -> RobotsRun {
-    let source = Source::new("test", text, "");
-    let compiled = Compiled::new(&source, &Behaviours::new(), order);
-    let mut run = compiled.unwrap_or_else(|e| panic!("{e}")).start(&source, workers);
-    run.force_parallel();
-    run
-}
 
 fn run(text: &str, workers: usize) -> RobotsRun {
     run_in_order(text, workers, StorageOrder::Spatial)
