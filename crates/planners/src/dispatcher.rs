@@ -67,7 +67,7 @@ impl Dispatcher {
             lists.push(boxes.collect::<Result<Vec<u32>, InputError>>()?);
         }
         Ok(Self {
-            fields: GoalFields::new(&graph, MAX_FIELD_BYTES),
+            fields: GoalFields::new(&graph, 1, MAX_FIELD_BYTES),
             labels: component_labels(&graph),
             tasks: TaskList::new(lists, team.known),
             policy: team.policy,

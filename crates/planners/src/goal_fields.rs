@@ -1,7 +1,11 @@
-//! Steps to many goals, turns included where the floor is small, in bounded memory and with bounded work per tick.
+//! Steps to many goals, turns included where the floor is small, in bounded memory and with bounded work per tick; where
+//! those from each box do not fit, from each region.
 
 use crate::graph::{AnchorGraph, NONE};
+use crate::regions::{RegionField, Regions};
 
+/// Most bytes that a planner keeps for the steps to the goals of its agents.
+pub(crate) const MAX_FIELD_BYTES: usize = 1 << 30;
 /// Most boxes of a floor where fields count turns: four numbers a box are too much memory beyond.
 const MAX_BOXES_WITH_TURNS: usize = 1 << 14;
 /// No path leads from there.
@@ -63,6 +67,8 @@ struct GoalField {
     goal: u32,
     used: u64,
     steps: Vec<u16>,
+    /// Instead of `steps` on floors with regions.
+    by_region: RegionField,
 }
 
 /// Fields of goals. What it forgets is computed again; where no field is known yet, the steps are those of a floor
@@ -81,15 +87,22 @@ pub(crate) struct GoalFields {
     /// Boxes by their steps, of those that come next.
     buckets: Vec<Vec<u32>>,
     one_way: OneWayStreets,
+    /// Where the steps from each box do not fit.
+    regions: Option<Regions>,
 }
 
 impl GoalFields {
-    pub(crate) fn new(graph: &AnchorGraph, max_bytes: usize) -> Self {
+    /// Creates fields for so many goals at once.
+    pub(crate) fn new(graph: &AnchorGraph, goals: usize, max_bytes: usize) -> Self {
         let has_turns = graph.len() <= MAX_BOXES_WITH_TURNS;
         let headings = if has_turns { 4 } else { 1 };
-        let capacity = (max_bytes / (2 * headings * graph.len()).max(1)).max(1);
+        let field_bytes = 2 * headings * graph.len();
+        let regions = (max_bytes / field_bytes.max(1) < goals).then(|| Regions::new(graph));
+        let field_bytes = regions.as_ref().map_or(field_bytes, Regions::field_bytes);
+        let capacity = (max_bytes / field_bytes.max(1)).max(1);
         Self {
             has_turns,
+            regions,
             fields: Vec::new(),
             index: vec![NONE; graph.len()],
             capacity,
@@ -101,14 +114,22 @@ impl GoalFields {
         }
     }
 
-    /// Returns the steps that a move from a box in a direction counts as.
+    /// Returns the steps to a goal by way of the neighbor of a box in a direction, as far as they compare with
+    /// [`Self::steps`] from the box itself.
     #[inline]
-    pub(crate) fn weight(&self, graph: &AnchorGraph, at: u32, direction: u8) -> u32 {
-        if self.has_turns {
-            1
-        } else {
-            self.one_way.weight(at, graph.step(at, direction), direction)
+    pub(crate) fn steps_by(&self, graph: &AnchorGraph, goal: u32, at: u32, direction: u8) -> u32 {
+        let neighbor = graph.step(at, direction);
+        if let (Some(regions), Some(field)) = (&self.regions, self.field(goal)) {
+            let steps = regions.steps_by(&field.by_region, at, neighbor);
+            return steps.unwrap_or(u32::from(UNREACHABLE));
         }
+        let weight = if self.has_turns { 1 } else { self.one_way.weight(at, neighbor, direction) };
+        self.steps(graph, goal, neighbor, direction) + weight
+    }
+
+    #[inline]
+    fn field(&self, goal: u32) -> Option<&GoalField> {
+        self.fields.get(self.index[goal as usize] as usize)
     }
 
     /// Returns whether so many fields are kept at once.
@@ -118,7 +139,7 @@ impl GoalFields {
 
     /// Returns whether fields are cheap enough to compare all tasks by them.
     pub(crate) fn is_small(&self) -> bool {
-        self.has_turns
+        self.has_turns && self.regions.is_none()
     }
 
     /// Begins a tick, in which so many boxes may be visited to compute fields.
@@ -138,7 +159,8 @@ impl GoalFields {
             return;
         }
         let mut field = if self.fields.len() < self.capacity {
-            GoalField { goal, used: self.now, steps: Vec::new() }
+            let by_region = RegionField::default();
+            GoalField { goal, used: self.now, steps: Vec::new(), by_region }
         } else {
             let Some(victim) = self.victim() else { return };
             let last = self.fields.len() - 1;
@@ -151,8 +173,11 @@ impl GoalFields {
         };
         field.goal = goal;
         field.used = self.now;
-        self.search(graph, goal, &mut field.steps);
-        self.work_left = self.work_left.saturating_sub(self.queue.len());
+        let work = match &self.regions {
+            Some(regions) => regions.search(graph, goal, &mut field.by_region),
+            None => self.search(graph, goal, &mut field.steps),
+        };
+        self.work_left = self.work_left.saturating_sub(work);
         self.index[goal as usize] = self.fields.len() as u32;
         self.fields.push(field);
     }
@@ -163,7 +188,8 @@ impl GoalFields {
         oldest.filter(|&index| self.fields[index].used < self.now)
     }
 
-    fn search(&mut self, graph: &AnchorGraph, goal: u32, steps: &mut Vec<u16>) {
+    /// Computes the steps to a goal. Returns the number of nodes that it came to.
+    fn search(&mut self, graph: &AnchorGraph, goal: u32, steps: &mut Vec<u16>) -> usize {
         steps.clear();
         self.queue.clear();
         if self.has_turns {
@@ -173,6 +199,7 @@ impl GoalFields {
             steps.resize(graph.len(), UNREACHABLE);
             self.search_boxes(graph, goal, steps);
         }
+        self.queue.len()
     }
 
     fn search_with_turns(&mut self, graph: &AnchorGraph, goal: u32, steps: &mut [u16]) {
@@ -238,13 +265,12 @@ impl GoalFields {
     /// Returns the steps from a box, with a heading, to a goal.
     #[inline]
     pub(crate) fn steps(&self, graph: &AnchorGraph, goal: u32, at: u32, heading: u8) -> u32 {
-        let index = self.index[goal as usize];
-        if index == NONE {
-            return straight_steps(graph, at, goal);
+        let Some(field) = self.field(goal) else { return straight_steps(graph, at, goal) };
+        if let Some(regions) = &self.regions {
+            return regions.steps(&field.by_region, at).unwrap_or(u32::from(UNREACHABLE));
         }
-        let steps = &self.fields[index as usize].steps;
         let slot = if self.has_turns { at * 4 + u32::from(heading) } else { at };
-        u32::from(steps[slot as usize])
+        u32::from(field.steps[slot as usize])
     }
 }
 

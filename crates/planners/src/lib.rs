@@ -19,11 +19,14 @@ mod plan;
 pub mod plan_file;
 mod pose;
 pub mod prioritized;
+mod regions;
 mod safe_intervals;
+mod stepper;
 pub mod tasks;
 mod team_planner;
 #[cfg(test)]
 mod tests;
+mod tick_planner;
 
 pub use dependency_graph::{DependencyGraph, Permission};
 pub use dispatcher::{Courier, Dispatcher, TeamTasks};
@@ -35,5 +38,6 @@ pub use pose::{Action, ActionModel, GridPose};
 pub use sidestep_kernel::{InputError, Seed};
 pub use sidestep_map::planning::FreeSpace;
 pub use team_planner::{
-    Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState, TeamStep,
+    BusyAgent, Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState, TeamStep,
 };
+pub use tick_planner::{LifelongAgent, TickPlanner, TickSituation};

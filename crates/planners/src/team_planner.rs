@@ -6,9 +6,11 @@ use crate::executor::{Execute, Execution, Executor};
 use crate::graph::{AnchorGraph, Graphs};
 use crate::instance::{Agent, Instance, check_sizes};
 use crate::lacam::{self, LacamConfig};
-use crate::pibt::{Obstructions, Pibt, PibtConfig, PibtState};
+use crate::pibt::PibtState;
 use crate::plan::Plan;
-use crate::pose::{Action, ActionModel, GridPose};
+use crate::pose::{Action, ActionModel};
+use crate::stepper::Stepper;
+pub use crate::stepper::{BusyAgent, TeamStep};
 use crate::{cbs, prioritized};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{InputError, Seed};
@@ -134,19 +136,8 @@ pub struct TeamPlanner {
     graphs: Graphs,
     sizes: Vec<u32>,
     config: TeamPlannerConfig,
-    pibt: Pibt,
+    stepper: Stepper,
     actions: Vec<Action>,
-}
-
-/// The agents of a team at the start of a step.
-#[derive(Debug, Clone, Copy)]
-pub struct TeamStep<'a> {
-    /// The pose of each agent.
-    pub poses: &'a [GridPose],
-    /// The goal of each agent; one without stays, but makes way.
-    pub goals: &'a [Option<(u32, u32)>],
-    /// What keeps agents from acting.
-    pub obstructions: Obstructions<'a>,
 }
 
 /// A plan and what its search took.
@@ -169,12 +160,10 @@ impl TeamPlanner {
         config: TeamPlannerConfig,
     ) -> Result<Self, InputError> {
         check_sizes(sizes.iter().copied())?;
-        let action_steps = config.action_steps;
-        let pibt_config = PibtConfig { seed: config.seed, action_steps, ..PibtConfig::default() };
-        let pibt = Pibt::new(free, sizes, pibt_config)?;
+        let stepper = Stepper::new(free, sizes, config.action_steps, config.seed)?;
         let graphs = Graphs::new(free, sizes.iter().copied());
         let sizes = sizes.to_vec();
-        Ok(Self { free: free.clone(), graphs, sizes, config, pibt, actions: Vec::new() })
+        Ok(Self { free: free.clone(), graphs, sizes, config, stepper, actions: Vec::new() })
     }
 
     /// Returns the next action of each agent, and advances the state by one step.
@@ -189,7 +178,8 @@ impl TeamPlanner {
         if self.config.method != Method::Pibt {
             self.renew(state, now);
             if let (Some(execution), Some(graph)) = (&state.execution, &state.graph) {
-                self.actions = execution.actions(&self.execute(graph), now.obstructions.idle);
+                let idle: Vec<u32> = now.busy.iter().map(|busy| busy.agent).collect();
+                self.actions = execution.actions(&self.execute(graph), &idle);
                 // The next step by priority inheritance, if there is one, compares its goals with these.
                 state.pibt.goals.copy_from_slice(now.goals);
                 state.pibt.step += 1;
@@ -198,7 +188,7 @@ impl TeamPlanner {
         } else {
             state.counts.plans += 1;
         }
-        self.pibt.step_among(&mut state.pibt, now.poses, now.goals, now.obstructions)
+        self.stepper.step(&mut state.pibt, now)
     }
 
     /// Drops the plan if it cannot go on or its time is over, and makes another one if it is time for that.
@@ -303,7 +293,7 @@ impl TeamPlanner {
             let Some(goal) = goal else { return none };
             agents.push(Agent { size, start, goal });
         }
-        let others: BTreeSet<(u32, u32)> = now.obstructions.boxes.iter().copied().collect();
+        let others: BTreeSet<(u32, u32)> = now.others.iter().copied().collect();
         // Other bodies are walls, unless an agent could not get anywhere: then they may move on.
         if !others.is_empty() {
             let is_free = |col, row| self.free.is_free(col, row) && !others.contains(&(col, row));

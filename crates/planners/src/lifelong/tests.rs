@@ -1,4 +1,5 @@
 use super::*;
+use crate::tick_planner::TickSituation;
 use std::collections::BTreeSet;
 
 /// A floor with pillars, agents in its first rows, and tasks all over it.
@@ -70,4 +71,43 @@ fn a_state_that_was_kept_goes_on_as_the_run_itself() {
         other.tick(&mut copy, &delays(tick, 20));
     }
     assert_eq!(copy, state);
+}
+
+#[test]
+fn agents_go_around_walls_although_the_steps_from_each_box_do_not_fit() {
+    // A wall of 80 boxes with a gap at its end, and the goal right behind its middle.
+    let free = FreeSpace::new(100, 90, |col, row| col != 50 || row > 79);
+    let arrival = |max_field_bytes: usize| {
+        let config = LifelongConfig { max_field_bytes, ..LifelongConfig::default() };
+        let made = Lifelong::new(&free, &[(48, 40)], &[vec![(52, 40)]], 1, config);
+        let (mut lifelong, mut state) = made.expect("a free floor");
+        assert!(lifelong.plans_around_walls());
+        while state.tasks.finished == 0 && state.tick < 1_000 {
+            lifelong.tick(&mut state, &[]);
+        }
+        state.tick
+    };
+    let best = arrival(1 << 20);
+    let by_regions = arrival(20_000);
+    assert!((best..best * 5 / 4).contains(&by_regions), "{by_regions} for {best}");
+}
+
+#[test]
+fn the_box_that_an_agent_wants_after_its_action_is_kept_for_it() {
+    let free = FreeSpace::new(6, 2, |_, _| true);
+    let mut planner = TickPlanner::new(&free, 2, 3, Seed(0), 1 << 20);
+    let agent = |at: (u32, u32), heading: u8, ticks_left: u32, age: u32| {
+        let at = planner.box_number(at);
+        LifelongAgent { at, to: at, heading, ticks_left, delay: 0, age }
+    };
+    // The first one turns to the east; the second one looks at the box that the first one comes to next.
+    let turning = agent((0, 0), 0, 1, 9);
+    let second = agent((1, 1), 3, 0, 0);
+    let goals = [Some((5, 0)), Some((1, 0))];
+    let mut action = |agents: &[LifelongAgent; 2]| {
+        planner.step(TickSituation { tick: 0, agents, goals: &goals, others: &[] })[1]
+    };
+    assert_eq!(action(&[turning, second]), Action::Wait);
+    let late = LifelongAgent { delay: 5, ..turning };
+    assert_eq!(action(&[late, second]), Action::Forward);
 }

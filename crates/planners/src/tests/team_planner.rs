@@ -1,7 +1,7 @@
 use super::floors::{Problem, problems};
 use crate::{
-    Executor, GridPose, Method, Obstructions, Plan, Seed, TeamPlanner, TeamPlannerConfig,
-    TeamPlannerState, TeamStep,
+    Executor, GridPose, Method, Plan, Seed, TeamPlanner, TeamPlannerConfig, TeamPlannerState,
+    TeamStep,
 };
 use proptest::prelude::*;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -52,11 +52,7 @@ impl Team {
     /// Makes a step in which some agents do nothing; an agent that cannot enter a box where another one stays, or which
     /// another one enters, stays, too.
     fn step(&mut self, slips: impl Fn(usize) -> bool) {
-        let now = TeamStep {
-            poses: &self.poses,
-            goals: &self.goals,
-            obstructions: Obstructions::default(),
-        };
+        let now = TeamStep { poses: &self.poses, goals: &self.goals, others: &[], busy: &[] };
         let actions = self.planner.step(&mut self.state, now).expect("right goals");
         let mut after: Vec<GridPose> = self.poses.clone();
         for (agent, &action) in actions.iter().enumerate().filter(|&(agent, _)| !slips(agent)) {

@@ -1,6 +1,7 @@
 //! Actions that take several cycles: how long each goes on, and where its body was before it. What follows from that on the
 //! floor is in `long_action.rs`.
 
+use sidestep_kernel::space::GridPosition;
 use sidestep_kernel::{AtomicColumn, EntityId};
 
 /// The actions in progress of all bodies, by id; empty where every action takes one cycle.
@@ -36,6 +37,12 @@ impl ProgressColumns {
     /// Returns the cycles until a body's action ends; 0 for one that may begin another.
     pub(crate) fn left(&self, id: EntityId) -> u32 {
         Self::word_of(&self.left, id)
+    }
+
+    /// Returns the anchor that a body leaves; none for one that holds no boxes but its own.
+    pub(crate) fn place_left(&self, id: EntityId) -> Option<GridPosition> {
+        let is_holding = Self::word_of(&self.steps, id) > 0;
+        is_holding.then(|| GridPosition::from_word(self.from.get(id as usize)))
     }
 
     /// Returns the cycles in which an action of a body went on that had begun before.

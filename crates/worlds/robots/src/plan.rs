@@ -11,7 +11,7 @@ use super::world::{RobotsWorld, Role};
 use super::{decide, purpose};
 use sidestep_kernel::{Cycle, EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
-use sidestep_planners::{Action, GridPose, Obstructions, PlanCounts, TeamStep};
+use sidestep_planners::{Action, BusyAgent, GridPose, PlanCounts, TeamStep};
 use std::collections::BTreeSet;
 
 /// What a team looks like at the start of a cycle.
@@ -20,7 +20,7 @@ struct TeamSituation {
     poses: Vec<GridPose>,
     goals: Vec<Option<(u32, u32)>>,
     others: Vec<(u32, u32)>,
-    idle: Vec<u32>,
+    busy: Vec<BusyAgent>,
 }
 
 impl RobotsWorld {
@@ -58,9 +58,8 @@ impl RobotsWorld {
         situation.goals =
             errands.unwrap_or_else(|| self.choose_goals(state, team, &memory.planner.pibt.goals));
         memory.compare(&situation.poses);
-        let TeamSituation { poses, goals, others, idle } = &situation;
-        let obstructions = Obstructions { boxes: others, idle };
-        let now = TeamStep { poses, goals, obstructions };
+        let TeamSituation { poses, goals, others, busy } = &situation;
+        let now = TeamStep { poses, goals, others, busy };
         let actions = planner.step(&mut memory.planner, now);
         let actions = actions.expect("goals are boxes where the body fits");
         for (robot, (id, &action)) in team.robots.clone().zip(actions).enumerate() {
@@ -89,8 +88,12 @@ impl RobotsWorld {
             let body = state.body(id);
             let (col, row) = self.map_position(body.position());
             situation.poses.push(GridPose::new(col, row, body.facing.get().heading()));
-            if state.delays.remaining(id) > 0 || state.action_progress.left(id) > 0 {
-                situation.idle.push(robot);
+            let steps_left = state.action_progress.left(id);
+            let delay_steps = state.delays.remaining(id);
+            if steps_left > 0 || delay_steps > 0 {
+                let left = state.action_progress.place_left(id);
+                let from = left.map_or((col, row), |place| self.map_position(place));
+                situation.busy.push(BusyAgent { agent: robot, from, steps_left, delay_steps });
             }
         }
         situation
