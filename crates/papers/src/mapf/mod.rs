@@ -35,7 +35,7 @@ pub struct MapfConfig {
 }
 
 impl Default for MapfConfig {
-    /// Some tens of minutes, most of them for LaCAM*.
+    /// About 20 minutes on two cores, most of them for LaCAM*.
     fn default() -> Self {
         let workers = available_workers();
         Self { seeds: 10, cycles: 800, robots: vec![20, 60], workers, quick: false }

@@ -24,7 +24,7 @@ Examples:
   sidestep reproduce loria --out runs/loria     report, figures, all numbers
   sidestep reproduce loria --seeds 40 --json > loria.json
   sidestep reproduce agentfly --quick
-  sidestep reproduce mapf --out runs/mapf       some tens of minutes
+  sidestep reproduce mapf --out runs/mapf       about 20 minutes
   sidestep reproduce serpentine --out runs/serpentine";
 
 /// Reproduce a paper's experiments, or a study, and judge the claims.
