@@ -1,7 +1,7 @@
 //! The cheapest path through the places around a robot, to where the path of the static map goes on.
 
 use super::local_box_set::LocalBoxSet;
-use super::local_grid::{EXIT_LEVELS, LocalGrid};
+use super::local_grid::{EXIT_LEVELS, LocalGrid, PRICES};
 use super::local_view::LocalView;
 use super::step_costs::StepCosts;
 use crate::effector::HEADINGS;
@@ -17,7 +17,7 @@ pub(super) fn first_step(view: &LocalView<'_>, prices: StepCosts) -> Option<u8> 
     let grid = LocalGrid::new(view, prices)?;
     let mut search = Search {
         grid: &grid,
-        off_lane: usize::from(prices.off_lane),
+        steps: [0, 1, 2, 3].map(|heading| StepsByCost::new(&grid, prices.off_lane, heading)),
         pending: [[LocalBoxSet::default(); 4]; PENDING_LEVELS],
         settled: [LocalBoxSet::default(); 4],
         last_level: 0,
@@ -64,14 +64,43 @@ fn first_cost(view: &LocalView<'_>, grid: &LocalGrid, prices: StepCosts, directi
 
 struct Search<'a> {
     grid: &'a LocalGrid,
-    /// Extra price of a place that is off lane.
-    off_lane: usize,
+    /// The steps of each heading.
+    steps: [StepsByCost; 4],
     /// Places and headings that are reached at a cost, by the cost modulo the number of levels.
     pending: [[LocalBoxSet; 4]; PENDING_LEVELS],
     /// Those that have been reached at any cost before, by heading.
     settled: [LocalBoxSet; 4],
     /// Highest cost at which something is pending.
     last_level: usize,
+}
+
+/// The steps with one heading, by what they cost.
+#[derive(Default)]
+struct StepsByCost {
+    /// The places from which a step costs that much, and the cost; places at each price on lane, and off it.
+    costs: [(LocalBoxSet, usize); 2 * PRICES],
+    /// The number of costs that some step has.
+    len: usize,
+}
+
+impl StepsByCost {
+    fn new(grid: &LocalGrid, off_lane_price: u16, heading: u8) -> Self {
+        let mut steps = Self::default();
+        let off_lane = grid.off_lane[usize::from(heading)];
+        for &(places, price) in &grid.prices {
+            steps.push(places.without(off_lane), heading, price);
+            steps.push(places.intersection(off_lane), heading, price + off_lane_price);
+        }
+        steps
+    }
+
+    /// Adds the steps into places of a price.
+    fn push(&mut self, into: LocalBoxSet, heading: u8, price: u16) {
+        if !into.is_empty() {
+            self.costs[self.len] = (into.shift(heading + 2), 1 + usize::from(price));
+            self.len += 1;
+        }
+    }
 }
 
 impl Search<'_> {
@@ -95,18 +124,10 @@ impl Search<'_> {
     fn reach_from(&mut self, level: usize, heading: u8, places: LocalBoxSet) {
         self.add(level + 1, heading + 1, places);
         self.add(level + 1, heading + 3, places);
-        let off_lane = self.grid.off_lane[usize::from(heading)];
-        for &(priced, price) in &self.grid.prices {
-            let of_price = places.intersection(priced);
-            if of_price.is_empty() {
-                continue;
-            }
-            let cost = level + 1 + usize::from(price);
-            let behind = |set: LocalBoxSet| set.shift(heading + 2).intersection(self.grid.open);
-            let on_lane = behind(of_price.without(off_lane));
-            let off_lane = behind(of_price.intersection(off_lane));
-            self.add(cost, heading, on_lane);
-            self.add(cost + self.off_lane, heading, off_lane);
+        let behind = places.shift(heading + 2).intersection(self.grid.open);
+        for number in 0..self.steps[usize::from(heading)].len {
+            let (from, cost) = self.steps[usize::from(heading)].costs[number];
+            self.add(level + cost, heading, behind.intersection(from));
         }
     }
 

@@ -5,7 +5,8 @@
 pub(super) const PLAN_RADIUS_BOXES: i32 = 4;
 pub(super) const PLAN_SIDE_BOXES: i32 = 2 * PLAN_RADIUS_BOXES + 1;
 
-const LOCAL_BOXES: u32 = (PLAN_SIDE_BOXES * PLAN_SIDE_BOXES) as u32;
+/// Number of places of the square.
+pub(super) const LOCAL_BOXES: usize = (PLAN_SIDE_BOXES * PLAN_SIDE_BOXES) as usize;
 const SIDE: u32 = PLAN_SIDE_BOXES as u32;
 /// The places of the column farthest west.
 const WESTERNMOST: u128 = {
@@ -33,7 +34,7 @@ impl LocalBoxSet {
     pub(super) const CENTER: Self = Self(1 << (LOCAL_BOXES / 2));
     /// The places at the edge of the square.
     pub(super) const EDGE: Self =
-        Self(WESTERNMOST | EASTERNMOST | ROW | ROW << (LOCAL_BOXES - SIDE));
+        Self(WESTERNMOST | EASTERNMOST | ROW | ROW << (LOCAL_BOXES as u32 - SIDE));
 
     /// Returns the set whose rows have these places, a bit each from the west; the rows begin in the south. Bits
     /// beyond the square are left out.
@@ -98,19 +99,37 @@ impl LocalBoxSet {
         (0..4).fold(Self::default(), |places, direction| places.union(self.shift(direction)))
     }
 
-    /// Returns column and row of each place, from the southwest.
-    pub(super) fn places(self) -> impl Iterator<Item = (i32, i32)> {
+    /// Adds the place with a number.
+    pub(super) fn insert_number(&mut self, number: usize) {
+        self.0 |= 1 << number;
+    }
+
+    /// Returns the number of each place, row by row from the southwest.
+    pub(super) fn numbers(self) -> impl Iterator<Item = usize> {
         let mut bits = self.0;
         std::iter::from_fn(move || {
             if bits == 0 {
                 return None;
             }
-            let n = bits.trailing_zeros() as i32;
+            let number = bits.trailing_zeros() as usize;
             bits &= bits - 1;
-            let col = n % PLAN_SIDE_BOXES - PLAN_RADIUS_BOXES;
-            let row = n / PLAN_SIDE_BOXES - PLAN_RADIUS_BOXES;
-            Some((col, row))
+            Some(number)
         })
+    }
+
+    /// Returns the number, and column and row, of each place, from the southwest.
+    pub(super) fn numbered_places(self) -> impl Iterator<Item = (usize, (i32, i32))> {
+        self.numbers().map(|number| {
+            let col = number as i32 % PLAN_SIDE_BOXES - PLAN_RADIUS_BOXES;
+            let row = number as i32 / PLAN_SIDE_BOXES - PLAN_RADIUS_BOXES;
+            (number, (col, row))
+        })
+    }
+
+    /// Returns column and row of each place, from the southwest.
+    #[cfg(test)]
+    pub(super) fn places(self) -> impl Iterator<Item = (i32, i32)> {
+        self.numbered_places().map(|(_, place)| place)
     }
 }
 

@@ -7,6 +7,7 @@ use crate::sensor::{NOTHING, Reading, WALL};
 use crate::world::{MountedSensor, RobotBody};
 use sidestep_error_models::ray::{crossings, turn_crossing};
 use sidestep_map::planning::{FREE_WINDOW_COLUMNS, FreeSpace};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -22,7 +23,7 @@ type FreeWindow = sidestep_map::planning::FreeWindow<FREE_WINDOW_COLUMNS>;
 const MAX_EXACT_BOXES: usize = 2;
 /// Votes of one beam for a box that it has passed, where beams are reliable: it outweighs 63 reports, each
 /// of which says only that something is in one of several boxes.
-const RELIABLE_VOTES: i8 = 64;
+const RELIABLE_VOTES: i32 = 64;
 
 /// Places around a robot where something is that the static map does not show.
 #[derive(Debug, Clone, Copy, Default)]
@@ -37,11 +38,12 @@ pub(super) struct LocalCostmap {
 #[derive(Debug)]
 pub(super) struct BeamModel {
     walls: Arc<FreeSpace>,
-    size: i32,
     /// Whether all readings are true.
     pub(super) are_reliable: bool,
     /// All beams in the order of the readings, at each heading.
     beams: [Box<[BeamPath]>; 4],
+    /// By heading: the beams that cross each box, box by box ([`BeamBox::crossings`]).
+    crossings: [Box<[Crossing]>; 4],
     /// By heading and by direction of the next step: the beams that cross the boxes that matter to it.
     step_beams: [[Box<[StepBeam]>; 4]; 4],
 }
@@ -66,11 +68,22 @@ struct BeamPath {
 }
 
 /// A box that a beam crosses, seen from the robot's lower-left box.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct BeamBox {
     col: i32,
     row: i32,
     class: u8,
+    /// The places from which the robot would cover it.
+    places: LocalBoxSet,
+    /// All beams that cross it, in the list of all.
+    crossings: Range<u32>,
+}
+
+/// A beam that crosses a box, and the number of that box along it.
+#[derive(Debug, Clone, Copy)]
+struct Crossing {
+    beam: u32,
+    number: u32,
 }
 
 impl BeamPath {
@@ -105,41 +118,33 @@ impl BeamPath {
     }
 }
 
+impl BeamPath {
+    /// Returns what a reading says of one of the boxes: votes for it being free, -1 if something may be in it, and 0
+    /// of a box that it knows nothing of.
+    fn votes(&self, number: usize, reading: Reading, free: &FreeWindow, passed: i32) -> i32 {
+        let class = self.crossed[number].class;
+        let is_passed = reading.observation == NOTHING || class < reading.class;
+        let is_behind_wall = self.crossed[..=number].iter().any(|crossed| crossed.is_wall(free));
+        if is_behind_wall || !is_passed && class > reading.class {
+            return 0;
+        }
+        if is_passed {
+            return passed;
+        }
+        // The thing is in a box of this class; where it is the wall behind them, they are free.
+        let of_class = self.crossed[number..].iter().take_while(|one| one.class == class);
+        let is_explained =
+            reading.observation == self.wall && of_class.into_iter().any(|one| one.is_wall(free));
+        if is_explained { passed } else { -1 }
+    }
+}
+
 impl BeamBox {
     /// Returns whether a wall is in the box, by the free boxes that are searched.
     #[inline(always)]
     fn is_wall(&self, free: &FreeWindow) -> bool {
-        let (row, col) = OccupancyVotes::index(self);
+        let [col, row] = [self.col, self.row].map(|offset| (offset + PLAN_RADIUS_BOXES) as usize);
         !free.is_free(col, row)
-    }
-}
-
-/// Votes of the beams for and against each box that is looked at being free.
-struct OccupancyVotes([[i8; SEARCH_SIDE_BOXES as usize]; SEARCH_SIDE_BOXES as usize]);
-
-impl Default for OccupancyVotes {
-    fn default() -> Self {
-        Self([[0; SEARCH_SIDE_BOXES as usize]; SEARCH_SIDE_BOXES as usize])
-    }
-}
-
-impl OccupancyVotes {
-    fn add(&mut self, crossed: &BeamBox, votes: i8) {
-        let (row, col) = Self::index(crossed);
-        let sum = &mut self.0[row][col];
-        *sum = sum.saturating_add(votes);
-    }
-
-    fn is_free(&self, crossed: &BeamBox) -> bool {
-        let (row, col) = Self::index(crossed);
-        self.0[row][col] > 0
-    }
-
-    #[inline(always)]
-    fn index(crossed: &BeamBox) -> (usize, usize) {
-        let row = crossed.row + PLAN_RADIUS_BOXES;
-        let col = crossed.col + PLAN_RADIUS_BOXES;
-        (row as usize, col as usize)
     }
 }
 
@@ -151,15 +156,16 @@ struct OccupiedSegment<'a> {
 
 impl BeamModel {
     pub(super) fn new(walls: Arc<FreeSpace>, size: u32, body: &RobotBody, box_size_m: f64) -> Self {
-        let beams: [Box<[BeamPath]>; 4] = [0, 1, 2, 3].map(|heading| {
+        let mut beams: [Box<[BeamPath]>; 4] = [0, 1, 2, 3].map(|heading| {
             let sensors = body.sensors.iter();
             sensors.flat_map(|sensor| beam_paths(sensor, size, heading, box_size_m)).collect()
         });
+        let crossings = beams.each_mut().map(|beams| link_crossings(beams));
         let are_reliable = body.sensors.iter().all(MountedSensor::is_error_free);
         let step_beams = beams
             .each_ref()
             .map(|beams| [0, 1, 2, 3].map(|direction| step_beams(beams, size as i32, direction)));
-        Self { walls, size: size as i32, are_reliable, beams, step_beams }
+        Self { walls, are_reliable, beams, crossings, step_beams }
     }
 
     /// Returns whether no reading speaks of something unknown in the boxes of the next step, beyond them, or to the
@@ -200,73 +206,79 @@ impl BeamModel {
             return None;
         }
         let free = &self.free_window(percept.at);
-        // Mostly nothing unknown is there, and then the free boxes need not be found.
-        self.occupied_segments(percept, free).next()?;
-        let mut votes = OccupancyVotes::default();
-        for (beam, &reading) in self.reports(percept) {
-            self.vote_free(beam, reading, free, &mut votes);
+        let mut costmap = None;
+        for (beam, &reading) in
+            self.beams[usize::from(percept.heading)].iter().zip(percept.readings)
+        {
+            let Some(segment) = beam.occupied_segment(reading, free) else { continue };
+            let costmap = costmap.get_or_insert_with(LocalCostmap::default);
+            self.block(&segment, percept, free, costmap);
         }
-        for segment in self.occupied_segments(percept, free) {
-            segment.boxes.iter().for_each(|crossed| votes.add(crossed, -1));
-        }
-        // Only now, because a box is free or not by the votes of all beams.
-        let mut costmap = LocalCostmap::default();
-        for segment in self.occupied_segments(percept, free) {
-            let occupied = segment.boxes.iter().filter(|crossed| !votes.is_free(crossed));
-            let is_exact = segment.is_near || occupied.clone().count() <= MAX_EXACT_BOXES;
-            let places = if is_exact { &mut costmap.blocked } else { &mut costmap.vague };
-            occupied.for_each(|crossed| self.block(crossed, places));
-        }
-        Some(costmap)
+        costmap
     }
 
-    /// Returns each beam at the robot's heading with its reading.
-    #[inline(always)]
-    fn reports<'a>(
-        &'a self,
-        percept: &'a Percept<'_>,
-    ) -> impl Iterator<Item = (&'a BeamPath, &'a Reading)> {
-        self.beams[usize::from(percept.heading)].iter().zip(percept.readings)
-    }
-
-    /// Returns the stretches of all beams in which something unknown is.
-    #[inline(always)]
-    fn occupied_segments<'a>(
-        &'a self,
-        percept: &'a Percept<'_>,
-        free: &'a FreeWindow,
-    ) -> impl Iterator<Item = OccupiedSegment<'a>> {
-        let reports = self.reports(percept);
-        reports.filter_map(|(beam, &reading)| beam.occupied_segment(reading, free))
-    }
-
-    /// Votes for the boxes that a beam has passed: all up to the wall if it reports nothing or that
-    /// wall, else those that are nearer than the thing it reports. One beam decides where beams are
-    /// reliable, and most of them where they are not.
-    fn vote_free(
+    /// Blocks the places from which the robot would cover a box of a stretch, unless the other beams say that it is
+    /// free.
+    fn block(
         &self,
-        beam: &BeamPath,
-        reading: Reading,
+        segment: &OccupiedSegment<'_>,
+        percept: &Percept<'_>,
         free: &FreeWindow,
-        votes: &mut OccupancyVotes,
+        costmap: &mut LocalCostmap,
     ) {
-        let to_wall = beam.crossed.iter().position(|crossed| crossed.is_wall(free));
-        let wall_reading =
-            to_wall.map(|n| Reading { observation: beam.wall, class: beam.crossed[n].class });
-        let is_clear = reading.observation == NOTHING || wall_reading == Some(reading);
-        let before_wall = &beam.crossed[..to_wall.unwrap_or(beam.crossed.len())];
-        let weight = if self.are_reliable { RELIABLE_VOTES } else { 1 };
-        let passed =
-            before_wall.iter().take_while(|crossed| is_clear || crossed.class < reading.class);
-        passed.for_each(|crossed| votes.add(crossed, weight));
+        let mut places = LocalBoxSet::default();
+        let mut boxes = 0;
+        for crossed in segment.boxes.iter().filter(|one| !self.is_free(one, percept, free)) {
+            places = places.union(crossed.places);
+            boxes += 1;
+        }
+        let is_exact = segment.is_near || boxes <= MAX_EXACT_BOXES;
+        let all = if is_exact { &mut costmap.blocked } else { &mut costmap.vague };
+        *all = all.union(places);
     }
 
-    /// Blocks the places from which the robot would cover a box.
-    fn block(&self, crossed: &BeamBox, blocked: &mut LocalBoxSet) {
-        for row in 0..self.size {
-            (0..self.size).for_each(|col| blocked.insert(crossed.col - col, crossed.row - row));
+    /// Returns whether the votes of all beams that cross a box say that it is free: one beam that has passed it decides
+    /// where beams are reliable, and most of them where they are not.
+    fn is_free(&self, crossed: &BeamBox, percept: &Percept<'_>, free: &FreeWindow) -> bool {
+        let heading = usize::from(percept.heading);
+        let passed = if self.are_reliable { RELIABLE_VOTES } else { 1 };
+        let crossings = crossed.crossings.start as usize..crossed.crossings.end as usize;
+        let votes = self.crossings[heading][crossings].iter().map(|crossing| {
+            let beam = crossing.beam as usize;
+            let path = &self.beams[heading][beam];
+            path.votes(crossing.number as usize, percept.readings[beam], free, passed)
+        });
+        votes.sum::<i32>() > 0
+    }
+}
+
+/// Notes for each box of the beams at a heading where the list of all beams that cross it is, and returns these lists.
+fn link_crossings(beams: &mut [BeamPath]) -> Box<[Crossing]> {
+    let mut by_box: BTreeMap<(i32, i32), Vec<Crossing>> = BTreeMap::new();
+    for (beam, path) in (0..).zip(&*beams) {
+        for (number, one) in (0..).zip(&path.crossed) {
+            by_box.entry((one.row, one.col)).or_default().push(Crossing { beam, number });
         }
     }
+    let mut all: Vec<Crossing> = Vec::new();
+    for list in by_box.values() {
+        let first = all.len() as u32;
+        all.extend(list);
+        for crossing in list {
+            let one = &mut beams[crossing.beam as usize].crossed[crossing.number as usize];
+            one.crossings = first..all.len() as u32;
+        }
+    }
+    all.into()
+}
+
+/// Returns the places from which a body covers a box.
+fn covering_places(size: u32, (box_col, box_row): (i32, i32)) -> LocalBoxSet {
+    let mut places = LocalBoxSet::default();
+    for row in 0..size as i32 {
+        (0..size as i32).for_each(|col| places.insert(box_col - col, box_row - row));
+    }
+    places
 }
 
 /// Returns the beams of a sensor at a heading, as far as their boxes are looked at.
@@ -282,7 +294,8 @@ fn beam_paths(sensor: &MountedSensor, size: u32, heading: u8, box_size_m: f64) -
         let beam_boxes = crossings(size, bearing_deg, range).into_iter().map(|crossing| {
             let turned = turn_crossing(crossing, size, heading);
             let class = model.class_of(crossing.distance, box_size_m);
-            BeamBox { col: turned.dx, row: turned.dy, class }
+            let places = covering_places(size, (turned.dx, turned.dy));
+            BeamBox { col: turned.dx, row: turned.dy, class, places, crossings: 0..0 }
         });
         let crossed = beam_boxes.take_while(|one| is_searched(one.col) && is_searched(one.row));
         paths.push(BeamPath { wall, crossed: crossed.collect() });

@@ -1,6 +1,6 @@
 //! The places around a robot as sets, a bit for each place, for a search that handles all of them at once.
 
-use super::local_box_set::{LocalBoxSet, PLAN_RADIUS_BOXES, PLAN_SIDE_BOXES};
+use super::local_box_set::{LOCAL_BOXES, LocalBoxSet, PLAN_RADIUS_BOXES, PLAN_SIDE_BOXES};
 use super::local_view::LocalView;
 use super::step_costs::StepCosts;
 use crate::effector::HEADINGS;
@@ -9,6 +9,8 @@ use sidestep_map::planning::FlowWindow;
 const SIDE: usize = PLAN_SIDE_BOXES as usize;
 /// Column and row of the robot itself.
 const CENTER: (usize, usize) = (PLAN_RADIUS_BOXES as usize, PLAN_RADIUS_BOXES as usize);
+/// Number of prices that a place can have.
+pub(super) const PRICES: usize = 5;
 /// Number of exit costs that are told apart. Of two exits that differ by more the farther one is never worth it.
 pub(super) const EXIT_LEVELS: usize = 64;
 
@@ -20,7 +22,7 @@ pub(super) struct LocalGrid {
     /// By direction: the places that are off lane for a robot that goes so.
     pub(super) off_lane: [LocalBoxSet; 4],
     /// The places by the price of standing there, beside the step.
-    pub(super) prices: [(LocalBoxSet, u16); 5],
+    pub(super) prices: [(LocalBoxSet, u16); PRICES],
     /// Places from which the path of the static map may be followed, by how much that costs from there on, less that
     /// of the cheapest one.
     pub(super) exits: [LocalBoxSet; EXIT_LEVELS],
@@ -40,12 +42,9 @@ impl LocalGrid {
                 LocalBoxSet::from_rows(|row| window.row(row))
             }
         });
-        Some(Self {
-            open: LocalBoxSet::from_rows(|row| flow.reaching_goal(row)),
-            off_lane,
-            prices: place_prices(view, prices),
-            exits: exits(view, &flow)?,
-        })
+        let open = LocalBoxSet::from_rows(|row| flow.reaching_goal(row));
+        let exits = exits(view, &flow, open)?;
+        Some(Self { open, off_lane, prices: place_prices(view, prices), exits })
     }
 
     /// Returns the price of standing in a place of the square, beside the step.
@@ -56,7 +55,7 @@ impl LocalGrid {
 }
 
 /// Returns the places of each price.
-fn place_prices(view: &LocalView<'_>, prices: StepCosts) -> [(LocalBoxSet, u16); 5] {
+fn place_prices(view: &LocalView<'_>, prices: StepCosts) -> [(LocalBoxSet, u16); PRICES] {
     let blocked = view.blocked;
     let beside = blocked.neighbors().without(blocked);
     let vague = view.vague.without(blocked);
@@ -72,27 +71,33 @@ fn place_prices(view: &LocalView<'_>, prices: StepCosts) -> [(LocalBoxSet, u16);
 
 /// Returns the places from which the static map's path may be followed: goals, and those where it leads out of the
 /// planned square, or along its edge. Where it leads back in, it may lead to the same obstacle again.
-fn exits(view: &LocalView<'_>, flow: &FlowWindow<SIDE>) -> Option<[LocalBoxSet; EXIT_LEVELS]> {
-    let goals = LocalBoxSet::from_rows(|row| flow.goals(row));
-    let on_edge = LocalBoxSet::EDGE.places().filter(|&offset| leads_out(view, offset));
-    let mut found: LocalBoxSet = goals;
-    on_edge.for_each(|(col, row)| found.insert(col, row));
+fn exits(
+    view: &LocalView<'_>,
+    flow: &FlowWindow<SIDE>,
+    open: LocalBoxSet,
+) -> Option<[LocalBoxSet; EXIT_LEVELS]> {
+    let mut found = LocalBoxSet::from_rows(|row| flow.goals(row));
+    let on_edge = LocalBoxSet::EDGE.intersection(open).without(found);
+    for (number, (col, row)) in on_edge.numbered_places() {
+        if leads_out(view, (col, row)) {
+            found.insert_number(number);
+        }
+    }
     // A robot that stands at one of several goals plans only where it has to leave it.
     let found = found.without(LocalBoxSet::CENTER);
-    let rise = |(col, row): (i32, i32)| {
-        let to = (
-            CENTER.0.wrapping_add_signed(col as isize),
-            CENTER.1.wrapping_add_signed(row as isize),
-        );
-        i32::from(flow.rise(CENTER, to))
-    };
-    let least = found.places().map(rise).min()?;
-    let mut exits = [LocalBoxSet::default(); EXIT_LEVELS];
-    for offset in found.places() {
-        let level = (rise(offset) - least) as usize;
-        exits[level.min(EXIT_LEVELS - 1)].insert(offset.0, offset.1);
+    let mut rises = [0; LOCAL_BOXES];
+    let mut least = i32::MAX;
+    for number in found.numbers() {
+        let rise = i32::from(flow.rise(CENTER, (number % SIDE, number / SIDE)));
+        rises[number] = rise;
+        least = least.min(rise);
     }
-    Some(exits)
+    let mut exits = [LocalBoxSet::default(); EXIT_LEVELS];
+    for number in found.numbers() {
+        let level = (rises[number] - least) as usize;
+        exits[level.min(EXIT_LEVELS - 1)].insert_number(number);
+    }
+    (!found.is_empty()).then_some(exits)
 }
 
 /// Returns whether the static map's path leads from a place at the edge out of the square, or along its edge.
