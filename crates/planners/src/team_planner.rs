@@ -126,6 +126,13 @@ impl TeamPlannerState {
     pub fn new(agents: usize) -> Self {
         Self { pibt: PibtState::new(agents), ..Self::default() }
     }
+
+    /// Advances the state by one step in which others chose the actions.
+    pub fn take_orders(&mut self, goals: &[Option<(u32, u32)>]) {
+        self.counts.plans += 1;
+        self.pibt.step += 1;
+        self.pibt.goals.copy_from_slice(goals);
+    }
 }
 
 /// The planner of a team: what it knows of the floor, and buffers. Its results depend on its arguments and on the

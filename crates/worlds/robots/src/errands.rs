@@ -33,11 +33,7 @@ impl RobotsWorld {
     ) -> Option<Vec<Option<(u32, u32)>>> {
         let mut guard = team_state.tasks()?;
         let TaskMemory { dispatcher, state: tasks } = &mut *guard;
-        let ids = team.robots.clone();
-        let couriers: Vec<Courier> = ids
-            .zip(poses)
-            .map(|(id, &pose)| Courier { pose, is_in_action: state.action_progress.left(id) > 0 })
-            .collect();
+        let couriers = couriers(state, team, poses);
         let before: Vec<Option<u64>> =
             tasks.agents.iter().map(|own| own.map(|own| own.task)).collect();
         let mut dispatcher = dispatcher.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -54,6 +50,26 @@ impl RobotsWorld {
         }
         Some((0..poses.len()).map(|robot| dispatcher.goal(tasks, robot)).collect())
     }
+
+    /// Returns the goals that [`Self::errands`] will return in the next cycle, and gives no task yet.
+    pub(crate) fn errands_ahead(
+        &self,
+        state: &RobotsState,
+        team: &Team,
+        team_state: &TeamState,
+        poses: &[GridPose],
+    ) -> Option<Vec<Option<(u32, u32)>>> {
+        let TaskMemory { dispatcher, state: mut tasks } = team_state.tasks()?.clone();
+        let mut dispatcher = dispatcher.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        dispatcher.advance(&mut tasks, &couriers(state, team, poses));
+        Some((0..poses.len()).map(|robot| dispatcher.goal(&tasks, robot)).collect())
+    }
+}
+
+/// Returns the robots of a team as those who carry tasks out.
+fn couriers(state: &RobotsState, team: &Team, poses: &[GridPose]) -> Vec<Courier> {
+    let of_robot = |(id, &pose)| Courier { pose, is_in_action: state.action_progress.left(id) > 0 };
+    team.robots.clone().zip(poses).map(of_robot).collect()
 }
 
 impl RobotsState {

@@ -3,7 +3,7 @@
 
 use super::Scratch;
 use super::cycle_context::{CycleContext, with_cycle};
-use super::decide::External;
+use super::decide::{ActionId, Avoidance, External};
 use super::effector::{HEADING_NAMES, Side};
 use super::state::RobotsState;
 use super::world::{BodyType, RobotModel, RobotsWorld, Role};
@@ -32,6 +32,7 @@ impl AlikeRobots<'_> {
         self.ty.kind == ty.kind
             && Arc::ptr_eq(&self.model.body, &model.body)
             && self.model.is_external == model.is_external
+            && self.model.is_ordered == model.is_ordered
     }
 }
 
@@ -93,6 +94,9 @@ impl RobotsWorld {
             );
         }
         spaces.extend(self.common_observation_spaces());
+        if model.is_ordered {
+            spaces.extend(self.planner_observation_spaces());
+        }
         spaces
     }
 
@@ -124,6 +128,19 @@ impl RobotsWorld {
         spaces
     }
 
+    /// Returns the spaces of what a planner knows beyond what the robot itself perceives.
+    fn planner_observation_spaces(&self) -> [ValueSpace; 2] {
+        let longest_side = self.map.width().max(self.map.height());
+        let boxes = ValueDomain::Integer { low: -1, high: i64::from(longest_side) - 1 };
+        let cycles = ValueDomain::Integer { low: 0, high: i64::from(u32::MAX) };
+        let goal = "column and row where it has to go next; -1 for one with no goal";
+        let busy = "cycles of delay, and of an action that goes on, before it can act";
+        [
+            ValueSpace::new("goal_boxes", boxes, goal).with_shape([2]),
+            ValueSpace::new("busy_cycles", cycles, busy),
+        ]
+    }
+
     fn max_heard(&self) -> usize {
         self.robots.len().saturating_sub(1).min(MAX_HEARD)
     }
@@ -131,6 +148,9 @@ impl RobotsWorld {
     /// Returns the spaces of a robot's orders.
     fn action_spaces(&self, model: &RobotModel) -> Vec<ValueSpace> {
         let actions = ValueDomain::Discrete(model.body.effector.actions.clone());
+        if model.is_ordered {
+            return vec![ValueSpace::new(External::ACTION, actions, "the action that it tries")];
+        }
         let trip = choice(["none", "begun", "done"]);
         let mut spaces = vec![
             ValueSpace::new(External::ACTION, actions, "the action that it tries"),
@@ -148,7 +168,11 @@ impl RobotsWorld {
     pub(super) fn record_order(&self, state: &RobotsState, order: &Order<'_>) {
         let [value] = *order.values else { return };
         let space = &self.teams.as_slice()[order.team].action_spaces[order.space];
-        External::record_order(&state.body(order.agent).memory, &space.name, value as u64);
+        let memory = &state.body(order.agent).memory;
+        match &self.type_of(order.agent).role {
+            Role::Robot(model) if model.is_ordered => Avoidance::order(memory, value as ActionId),
+            _ => External::record_order(memory, &space.name, value as u64),
+        }
     }
 
     /// Writes the percepts of a team.
@@ -166,6 +190,30 @@ impl RobotsWorld {
                 cycle.observe(id, row, scratch, buffers);
             }
         });
+        self.observe_goals(state, team, buffers);
+    }
+
+    /// Writes what a planner knows of a team that it leads from outside, into the last buffers.
+    fn observe_goals(&self, state: &RobotsState, team: usize, buffers: &mut [BufferMut<'_>]) {
+        let agents = &self.teams.as_slice()[team].agents;
+        let first = agents.first().map(|&id| &self.type_of(id).role);
+        let Some(Role::Robot(model)) = first.filter(|_| !buffers.is_empty()) else { return };
+        let Some((_, [places, busy])) = buffers.split_last_chunk_mut::<2>() else { return };
+        if !model.is_ordered {
+            return;
+        }
+        for (team, team_state) in self.planner_teams.iter().zip(&state.planner_teams) {
+            let goals = self.goals_ahead(state, team, team_state);
+            for (id, goal) in team.robots.clone().zip(goals) {
+                let Ok(row) = agents.binary_search(&id) else { continue };
+                let [col, map_row] =
+                    goal.map_or([-1; 2], |(col, row)| [i64::from(col), i64::from(row)]);
+                places.set_integer(2 * row, col);
+                places.set_integer(2 * row + 1, map_row);
+                let cycles = state.delays.remaining(id) + state.action_progress.left(id);
+                busy.set_integer(row, i64::from(cycles));
+            }
+        }
     }
 }
 

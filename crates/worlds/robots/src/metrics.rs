@@ -120,7 +120,8 @@ impl RobotsWorld {
     fn is_on_trip(&self, body: &BodyState) -> bool {
         let Role::Robot(model) = &self.type_of(body.id).role else { return false };
         let has_ordered_trips = body.trips.get() > 0 || body.trip_begun.get() > 0;
-        model.behaviour.is_on_trip(&memory_of(body)) || model.is_external && has_ordered_trips
+        let is_by_order = model.behaviour.is_external() && has_ordered_trips;
+        model.behaviour.is_on_trip(&memory_of(body)) || is_by_order
     }
 
     /// Returns the cycles that a robot spent on trips, the one under way included.

@@ -3,10 +3,12 @@
 //! The planner is a part of the environment, and privileged: it knows where all bodies truly stand, and which robots
 //! are delayed. It writes each action into the robot's memory, from where the robot's behavior takes it.
 
+use super::effector::{FORWARD, LEFT, RIGHT, STAY};
 use super::perceive::memory_of;
 use super::state::BodyRecord;
 use super::state::RobotsState;
 use super::team::{Team, TeamState};
+use super::team_memory::TeamMemory;
 use super::world::{RobotsWorld, Role};
 use super::{decide, purpose};
 use sidestep_kernel::{Cycle, EntityId, Seed};
@@ -60,6 +62,11 @@ impl RobotsWorld {
         memory.compare(&situation.poses);
         let TeamSituation { poses, goals, others, busy } = &situation;
         let now = TeamStep { poses, goals, others, busy };
+        if team.leader.is_external {
+            memory.planner.take_orders(goals);
+            self.note_orders(state, team, memory, poses);
+            return;
+        }
         let actions = planner.step(&mut memory.planner, now);
         let actions = actions.expect("goals are boxes where the body fits");
         for (robot, (id, &action)) in team.robots.clone().zip(actions).enumerate() {
@@ -68,6 +75,37 @@ impl RobotsWorld {
             memory.planned[robot] = poses[robot].after(action);
             decide::Avoidance::order(&state.body(id).memory, action_id(action));
         }
+    }
+
+    /// Notes where the actions lead that a caller has ordered for a team.
+    fn note_orders(
+        &self,
+        state: &RobotsState,
+        team: &Team,
+        memory: &mut TeamMemory,
+        poses: &[GridPose],
+    ) {
+        for (robot, id) in team.robots.clone().enumerate() {
+            let order = &state.body(id).memory;
+            if self.is_kept_out(state, id) && decide::Avoidance::ordered(order) == FORWARD {
+                decide::Avoidance::order(order, STAY);
+            }
+            let action = planned_action(decide::Avoidance::ordered(order));
+            memory.planned[robot] = action.and_then(|action| poses[robot].after(action));
+        }
+    }
+
+    /// Returns the goals that the robots of a team have in the next cycle, if they are not delayed anew before it.
+    pub(crate) fn goals_ahead(
+        &self,
+        state: &RobotsState,
+        team: &Team,
+        team_state: &TeamState,
+    ) -> Vec<Option<(u32, u32)>> {
+        let (_planner, memory) = team_state.locked();
+        let situation = self.situation(state, team);
+        let errands = self.errands_ahead(state, team, team_state, &situation.poses);
+        errands.unwrap_or_else(|| self.choose_goals(state, team, &memory.planner.pibt.goals))
     }
 
     /// Returns the poses of a team, which of it are delayed or in an action, and the boxes of all other bodies. Those that a
@@ -197,12 +235,18 @@ fn meets(taken: &BTreeSet<(u32, u32)>, (col, row): (u32, u32), size: u32) -> boo
 
 fn action_id(action: Action) -> decide::ActionId {
     match action {
-        Action::Forward => super::effector::FORWARD,
-        Action::TurnLeft => super::effector::LEFT,
-        Action::TurnRight => super::effector::RIGHT,
+        Action::Forward => FORWARD,
+        Action::TurnLeft => LEFT,
+        Action::TurnRight => RIGHT,
         // Robots have headings, so no planner of theirs moves them sideways.
-        Action::Wait | Action::Move(_) => super::effector::STAY,
+        Action::Wait | Action::Move(_) => STAY,
     }
+}
+
+/// Returns what an action is for a planner; none of one that is not among the standard ones.
+fn planned_action(action: decide::ActionId) -> Option<Action> {
+    let actions = [Action::Forward, Action::TurnLeft, Action::TurnRight, Action::Wait];
+    actions.into_iter().find(|&one| action_id(one) == action)
 }
 
 #[cfg(test)]

@@ -370,6 +370,8 @@ pub(super) enum PlannerMethod {
     Cbs,
     /// A plan that was made elsewhere.
     File,
+    /// A program that uses the library orders the actions, cycle by cycle.
+    External,
 }
 
 /// How a plan is carried out.

@@ -16,10 +16,19 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub(crate) struct Team {
     /// Their ids.
     pub(crate) robots: Range<EntityId>,
-    /// How they are led. The seed is another one in each run.
-    pub(crate) config: TeamPlannerConfig,
+    /// Who leads them.
+    pub(crate) leader: TeamLeader,
     /// What they carry out; none for robots with goals of their own.
     pub(crate) tasks: Option<Arc<TeamTasks>>,
+}
+
+/// Who leads a team.
+#[derive(Debug, Clone)]
+pub(crate) struct TeamLeader {
+    /// The planner. The seed is another one in each run.
+    pub(crate) config: TeamPlannerConfig,
+    /// Whether a caller orders the actions of all robots, instead of the planner.
+    pub(crate) is_external: bool,
 }
 
 /// The planner of a team: what changes, and a cache.
@@ -51,7 +60,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl TeamState {
     /// Returns the state of a team of robots of these sizes before the first cycle.
     pub(crate) fn new(free: &FreeSpace, sizes: &[u32], team: &Team, seed: Seed) -> Self {
-        let config = TeamPlannerConfig { seed, ..team.config.clone() };
+        let config = TeamPlannerConfig { seed, ..team.leader.config.clone() };
         let is_stepwise = config.method == Method::Pibt;
         let planner = TeamPlanner::new(free, sizes, config).expect("a body has at least one box");
         let robots = sizes.len();

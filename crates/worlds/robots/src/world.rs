@@ -224,12 +224,18 @@ pub struct RobotModel {
     pub behaviour: Arc<dyn Behaviour>,
     /// Whether it is decided from outside; asked once, because the answer is needed in every cycle.
     pub(super) is_external: bool,
+    /// Whether the orders from outside are those of the planner of its team.
+    pub(super) is_ordered: bool,
 }
 
 impl RobotModel {
-    pub(crate) fn new(body: Arc<RobotBody>, behaviour: Arc<dyn Behaviour>) -> Self {
-        let is_external = behaviour.is_external();
-        Self { body, behaviour, is_external }
+    pub(crate) fn new(
+        body: Arc<RobotBody>,
+        behaviour: Arc<dyn Behaviour>,
+        is_ordered: bool,
+    ) -> Self {
+        let is_external = behaviour.is_external() || is_ordered;
+        Self { body, behaviour, is_external, is_ordered }
     }
 }
 

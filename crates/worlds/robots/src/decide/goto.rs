@@ -41,6 +41,11 @@ impl Avoidance {
         memory[ORDER_WORD].set(u32::from(action) + 1);
     }
 
+    /// Returns the action that [`Self::order`] wrote; it stays written.
+    pub(crate) fn ordered(memory: &[AtomicCell<u32>; 4]) -> ActionId {
+        memory[ORDER_WORD].get().checked_sub(1).map_or(STAY, |order| order as ActionId)
+    }
+
     /// Returns the boxes of a goal, where a planner chooses among them.
     fn anchors(&self, goal: usize) -> &[(u32, u32)] {
         match self {

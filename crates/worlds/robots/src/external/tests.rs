@@ -301,3 +301,100 @@ fn what_cannot_be_obeyed_is_refused_and_nothing_of_it_noted() {
     assert!(error.to_string().contains("sonar-8_report of 5 x"), "{error}");
     assert!(run.observe(7, &mut []).is_err());
 }
+
+/// Two robots that carry tasks out, and two that go to and fro, led from outside; some are late, and wheels slip.
+const LED: &str = r#"
+format = 1
+world = "robots"
+seed = 3
+cycles = 300
+conflict_policy = "simultaneous"
+map.ascii = """
+............
+............
+............
+............
+"""
+[[robots]]
+at = [[0, 0, 0], [0, 1, 0]]
+action_cycles = 2
+planner = { method = "external" }
+tasks = { list = [[[5, 0], [1, 1]], [[7, 1], [2, 0]]] }
+[[robots]]
+at = [[0, 3, 0], [11, 2, 0]]
+effector = "late"
+behaviour = { kind = "shuttle", a = [0, 2, 1, 2], b = [11, 2, 1, 2] }
+planner = { method = "external" }
+[effectors.late]
+forward = [{ p = 0.9, path = "F" }, { p = 0.1 }]
+[effectors.late.delays]
+p = 0.05
+min = 1
+max = 5
+"#;
+
+/// Orders each robot to turn to its goal, along the row first, and to go there.
+fn led(run: &mut RobotsRun, cycles: u64) {
+    for _ in 0..cycles {
+        for team in 0..run.agent_teams().len() {
+            let all = observed(run, team);
+            let agents = run.agent_teams()[team].agents.clone();
+            let action = |k: usize| {
+                let [east, north] =
+                    [2 * k, 2 * k + 1].map(|n| all["goal_boxes"][n] - all["at_boxes"][n]);
+                let toward = match (east.signum(), north.signum()) {
+                    (1, _) => 0,
+                    (-1, _) => 2,
+                    (_, 1) => 1,
+                    (_, -1) => 3,
+                    _ => return 3.0,
+                };
+                match (toward - all["heading"][k]).rem_euclid(4) {
+                    0 => 0.0,
+                    3 => 2.0,
+                    _ => 1.0,
+                }
+            };
+            let values: Vec<f64> = (0..agents.len()).map(action).collect();
+            let order = MultiAgentOrder { order: "action", agents: &agents, values: &values };
+            run.order(&order).expect("right");
+        }
+        run.advance(1);
+    }
+}
+
+#[test]
+fn a_team_that_is_led_from_outside_is_told_its_goals_and_stands_still_without_orders() {
+    let mut run = robots_run(&source(LED), 1).expect("it compiles");
+    run.advance(50);
+    assert_eq!(run.metrics().total.distance_m, 0.0);
+    assert_eq!(observed(&run, 0)["goal_boxes"], [5, 0, 7, 1]);
+    assert_eq!(observed(&run, 1)["goal_boxes"], [11, 3, 0, 2]);
+    led(&mut run, 250);
+    let metrics = run.metrics();
+    assert!(metrics.tasks_finished >= 10, "{metrics:?}");
+    assert!(metrics.total.trips >= 25, "{metrics:?}");
+    assert!(metrics.total.off_plan > 0, "{metrics:?}");
+}
+
+#[test]
+fn a_run_that_is_led_from_outside_is_the_same_from_its_orders_and_when_it_is_resumed() {
+    let run = |workers: usize| robots_run(&source(LED), workers).expect("it compiles");
+    let mut first = run(1);
+    let rows = recorded(&mut first, 200, |run| led(run, 9.min(200 - run.cycle())));
+    for workers in [1, 2, 3] {
+        let mut again = run(workers);
+        again.replay_orders(book(&rows)).expect("they were obeyed once");
+        again.advance(200);
+        assert_eq!(again.digest(), first.digest(), "{workers} workers");
+    }
+    for at in [0, 1, 7, 50, 123] {
+        let mut before = run(1);
+        led(&mut before, at);
+        let checkpoint = before.checkpoint();
+        let mut after = run(2);
+        after.restore(&checkpoint).expect("the same scenario");
+        led(&mut after, 200 - at);
+        assert_eq!(after.digest(), first.digest(), "resumed at {at}");
+    }
+}

@@ -2,7 +2,8 @@
 
 use super::super::{Period, SideBoxes, StartPose};
 use super::*;
-use sidestep_planners::{TeamPlannerConfig, TeamTasks};
+use crate::team::TeamLeader;
+use sidestep_planners::TeamTasks;
 
 /// Bodies that a scenario describes together.
 #[derive(Debug)]
@@ -16,8 +17,8 @@ pub(super) struct BodyGroup {
     pub(super) period: u32,
     pub(super) phase: Option<u32>,
     pub(super) action_cycles: u32,
-    /// How a planner leads them, if one does.
-    pub(super) planner: Option<TeamPlannerConfig>,
+    /// Who leads them, if a planner does.
+    pub(super) leader: Option<TeamLeader>,
     /// What they carry out, led by the planner.
     pub(super) tasks: Option<Arc<TeamTasks>>,
 }

@@ -2,7 +2,7 @@
 //! one replaces, behaviors that cannot do what they are for.
 
 use super::super::{
-    AvoidanceSection, EffectorSection, RobotSection, RobotsFile, TransitionSection,
+    AvoidanceSection, EffectorSection, PlannerMethod, RobotSection, RobotsFile, TransitionSection,
 };
 use super::known_tables::{PRESETS, Shadowed};
 use super::*;
@@ -249,6 +249,12 @@ fn behaviour_remarks(given: &Given<'_>, k: usize, s: &RobotSection) -> Vec<Remar
         let words = "its robots stand still in a run of the command: their actions come from a program that \
                      uses the library";
         remarks.push(Remark::warning(&key, words));
+    }
+    let method = s.planner.as_ref().map(|planner| planner.get_ref().method);
+    if method == Some(PlannerMethod::External) {
+        let words = "its robots stand still in a run of the command: their actions come from a program that \
+                     uses the library";
+        remarks.push(Remark::warning(format!("robots.{k}.planner.method"), words));
     }
     let goals = behaviour.and_then(|b| b.goals.as_ref()).map_or(0, Vec::len);
     if kind == "goto" && goals == 1 && behaviour.and_then(|b| b.repeat) == Some(true) {

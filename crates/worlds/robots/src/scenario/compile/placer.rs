@@ -37,10 +37,10 @@ impl Placer {
     pub(super) fn planner_teams(&self) -> Vec<Team> {
         let mut teams = Vec::new();
         for (group, first) in self.groups.iter().zip(self.first_ids()) {
-            let config = group.planner.clone().filter(|_| group.count > 0);
+            let leader = group.leader.clone().filter(|_| group.count > 0);
             let robots = first..first + group.count as EntityId;
             let tasks = group.tasks.clone();
-            teams.extend(config.map(|config| Team { robots, config, tasks }));
+            teams.extend(leader.map(|leader| Team { robots, leader, tasks }));
         }
         teams
     }

@@ -5,6 +5,7 @@ use super::bodies::{BodyGroup, action_cycles, period_cycles};
 use super::robots::side_boxes;
 use super::*;
 use crate::effector::{LEFT, RIGHT, STANDARD_ACTIONS, STAY, Side};
+use crate::team::TeamLeader;
 use sidestep_kernel::Seed;
 use sidestep_planners::{Executor, Method, TeamPlannerConfig, plan_file};
 use sidestep_scenario::file::read_text;
@@ -32,25 +33,26 @@ const DEFAULT_REPLAN_EVERY: u32 = 20;
 const MAX_PLAN_BYTES: u64 = 100 << 20;
 
 impl Compiler<'_> {
-    /// Returns how a planner leads the robots of a section, and refuses those that it cannot lead.
-    pub(super) fn planner(
+    /// Returns who leads the robots of a section, and refuses those that no planner can lead.
+    pub(super) fn leader(
         &self,
         s: &RobotSection,
         effector: &EffectorModel,
-    ) -> Result<Option<TeamPlannerConfig>, InputError> {
+    ) -> Result<Option<TeamLeader>, InputError> {
         let Some(planner) = &s.planner else { return Ok(None) };
         let span = planner.span();
         let planner = planner.get_ref();
         self.check_planned_robots(s, effector, &span)?;
         self.check_planner_keys(planner)?;
-        Ok(Some(TeamPlannerConfig {
+        let config = TeamPlannerConfig {
             method: self.planner_method(planner, &span)?,
             executor: executor(planner),
             window: planner.window.as_ref().map(|window| window.get_ref().get() as u32),
             may_follow: self.file.conflict_policy == ConflictPolicy::Simultaneous,
             action_steps: action_cycles(s),
             seed: Seed(0),
-        }))
+        };
+        Ok(Some(TeamLeader { config, is_external: planner.method == PlannerMethod::External }))
     }
 
     fn planner_method(
@@ -61,7 +63,8 @@ impl Compiler<'_> {
         let budget = planner.budget_expansions.as_ref();
         let budget_expansions = budget.map_or(DEFAULT_BUDGET, |budget| budget.get_ref().get());
         match planner.method {
-            PlannerMethod::Pibt => Ok(Method::Pibt),
+            // What a caller orders needs no plan that is kept, as PIBT does not.
+            PlannerMethod::Pibt | PlannerMethod::External => Ok(Method::Pibt),
             PlannerMethod::Lacam => Ok(Method::Lacam { budget_expansions }),
             PlannerMethod::Prioritized => Ok(Method::Prioritized { max_orders: MAX_ORDERS }),
             PlannerMethod::Cbs => Ok(Method::Cbs { budget_expansions }),
@@ -80,7 +83,7 @@ impl Compiler<'_> {
     fn check_planner_keys(&self, planner: &PlannerSection) -> Result<(), InputError> {
         let method = planner.method;
         let executor = planner.executor.as_ref().map(|executor| *executor.get_ref());
-        let is_stepwise = method == PlannerMethod::Pibt;
+        let is_stepwise = matches!(method, PlannerMethod::Pibt | PlannerMethod::External);
         let is_given = method == PlannerMethod::File;
         let has_budget = matches!(method, PlannerMethod::Lacam | PlannerMethod::Cbs);
         let is_replan = executor == Some(PlanExecutor::Replan);
@@ -93,7 +96,7 @@ impl Compiler<'_> {
         let faults = [
             (
                 executor_span.clone().filter(|_| is_stepwise),
-                "`pibt` plans anew in each cycle, so it has no executor",
+                "`pibt` and `external` choose anew in each cycle, so they have no executor",
                 "leave out `executor`, or give method = \"lacam\"",
             ),
             (

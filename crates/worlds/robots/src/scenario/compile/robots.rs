@@ -21,8 +21,9 @@ impl Compiler<'_> {
         let count = self.body_count(s.count.as_ref(), &s.at, &span)?;
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let planner = self.planner(s, &body.effector)?;
-        let has_planner = planner.is_some();
+        let leader = self.leader(s, &body.effector)?;
+        let has_planner = leader.is_some();
+        let is_ordered = leader.as_ref().is_some_and(|leader| leader.is_external);
         let robot = RobotKind { size, body: &body, has_planner };
         let tasks = self.tasks(s, count)?.map(Arc::new);
         let behaviour = match tasks {
@@ -30,7 +31,7 @@ impl Compiler<'_> {
             None => self.behaviour(s.behaviour.as_ref(), robot)?,
         };
         let actions = Arc::clone(&body.actions);
-        let role = Role::Robot(RobotModel::new(body, behaviour));
+        let role = Role::Robot(RobotModel::new(body, behaviour, is_ordered));
         let ty = self.body_type(&s.kind, (size, size), actions, role)?;
         let ty = GroupTypes::Shared(self.add_type(ty, &span)?);
         let group = BodyGroup {
@@ -42,7 +43,7 @@ impl Compiler<'_> {
             period: period_cycles(s.period),
             phase: s.phase,
             action_cycles: action_cycles(s),
-            planner,
+            leader,
             tasks,
         };
         self.start_as_planned(s, group)
@@ -66,8 +67,9 @@ impl Compiler<'_> {
         }
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let planner = self.planner(s, &body.effector)?;
-        let has_planner = planner.is_some();
+        let leader = self.leader(s, &body.effector)?;
+        let has_planner = leader.is_some();
+        let is_ordered = leader.as_ref().is_some_and(|leader| leader.is_external);
         let routes = RoutePlanner::new(&self.map, size, None, &body, has_planner);
         let alone = (!has_planner).then(|| self.avoidance(None, &routes, &body));
         let mut places = Vec::new();
@@ -76,7 +78,7 @@ impl Compiler<'_> {
             let goals = vec![self.scen_goal(scen, row, &routes)?];
             let avoidance = alone.clone().unwrap_or_else(|| Avoidance::Team(vec![vec![row.goal]]));
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
-            let model = RobotModel::new(Arc::clone(&body), behaviour);
+            let model = RobotModel::new(Arc::clone(&body), behaviour, is_ordered);
             let actions = Arc::clone(&body.actions);
             let ty = self.body_type(&s.kind, (size, size), actions, Role::Robot(model))?;
             types.push(self.add_type(ty, span)?);
@@ -91,7 +93,7 @@ impl Compiler<'_> {
             period: period_cycles(s.period),
             phase: s.phase,
             action_cycles: action_cycles(s),
-            planner,
+            leader,
             tasks: None,
         };
         self.start_as_planned(s, group)
