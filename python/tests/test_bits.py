@@ -120,3 +120,52 @@ def test_a_seed_beside_the_scenario_and_one_within_it_are_the_same_run(scenario,
     assert beside.scenario.text == within.scenario.text
     assert (other.scenario.seed, other.digest) == (12, again.digest)
     assert made.seed != 11
+
+
+@pytest.fixture
+def led():
+    """Robots with goals, led from outside."""
+    return {
+        "world": "robots",
+        "cycles": 120,
+        "map": {"ascii": "............\n............\n............"},
+        "robots": {
+            "count": 4,
+            "effector": "nomad",
+            "behaviour": {"kind": "shuttle", "a": [0, 0, 2, 3], "b": [10, 0, 2, 3]},
+            "planner": {"method": "external"},
+        },
+    }
+
+
+def straight(observed, state):
+    """Sends each robot along its row to its goal."""
+    east = np.sign(observed["goal_boxes"][:, 0] - observed["at_boxes"][:, 0])
+    wanted = np.where(east < 0, 2, 0)
+    return np.where(observed["heading"] == wanted, 0, 1)
+
+
+def test_a_planner_in_python_is_told_goals_and_its_run_is_replayed_by_the_command(led, command, tmp_path):
+    folder = tmp_path / "led"
+    with sidestep.Simulation(led, seed=4, out=folder) as sim:
+        observed = sim.observe()
+        assert observed["goal_boxes"].shape == (4, 2)
+        assert (observed["goal_boxes"][:, 0] <= 1).all(), "the first goal is end a"
+        assert (observed["busy_cycles"] == 0).all()
+        sim.run(decide=straight)
+        metrics, digest = sim.metrics(), sim.digest
+    assert metrics["trips"] > 0
+    assert metrics["plans"] == 120
+    told = subprocess.run([command, "replay", folder], check=True, capture_output=True, text=True)
+    assert digest in told.stdout
+    again = sidestep.Simulation(led, seed=4, workers=3)
+    again.run(decide=straight)
+    assert again.digest == digest
+
+
+def test_actions_that_a_planner_cannot_mean_are_refused_with_the_right_ones(led):
+    sim = sidestep.Simulation(led, seed=4)
+    with pytest.raises(sidestep.OrderError, match="one of 0 forward"):
+        sim.run(decide=lambda observed, state: np.full(4, 9))
+    with pytest.raises(sidestep.OrderError, match="an array of the shape"):
+        sim.run(decide=lambda observed, state: np.zeros(3, int))

@@ -11,7 +11,7 @@ import sidestep
 from sidestep import _native
 
 
-@pytest.mark.parametrize("page", ["README.md", "python/README.md", "docs/src/python.md"])
+@pytest.mark.parametrize("page", ["README.md", "python/README.md", "docs/src/python.md", "docs/src/planners.md"])
 def test_the_code_of_a_page_runs_from_its_top_to_its_end(page, root, monkeypatch):
     monkeypatch.chdir(root)
     blocks = re.findall(r"^```python\n(.*?)^```", (root / page).read_text(), re.M | re.S)
