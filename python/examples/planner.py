@@ -45,13 +45,14 @@ class Planner:
     def __init__(self, prices: NDArray[np.float64], seed: int = 0) -> None:
         """``prices[col, row, heading]`` is what it costs to enter a box with a heading; infinite for walls."""
         self.prices = prices
+        self.cols, self.rows = prices.shape[0], prices.shape[1]
         self.costs: dict[tuple[int, int], NDArray[np.float64]] = {}
         self.draws = np.random.default_rng(seed)
 
     def cost(self, goal: tuple[int, int]) -> NDArray[np.float64]:
         """Returns the cost of the cheapest path from each box to a goal."""
         if goal not in self.costs:
-            cost = np.full(self.prices.shape[:2], np.inf)
+            cost = np.full((self.cols, self.rows), np.inf)
             cost[goal] = 0.0
             queue = [(0.0, goal)]
             while queue:
@@ -59,7 +60,7 @@ class Planner:
                 for heading, (east, north) in enumerate(STEPS):
                     before = (at[0] - east, at[1] - north)
                     there = here + self.prices[at[0], at[1], heading]
-                    inside = 0 <= before[0] < cost.shape[0] and 0 <= before[1] < cost.shape[1]
+                    inside = 0 <= before[0] < self.cols and 0 <= before[1] < self.rows
                     if inside and np.isfinite(self.prices[before[0], before[1], 0]) and there < cost[before]:
                         cost[before] = there
                         heapq.heappush(queue, (there, before))
@@ -76,7 +77,7 @@ class Planner:
             (col, row), turned = places[robot], int(observed["heading"][robot])
             ahead = [(col + east, row + north) for east, north in STEPS]
             cost = self.cost((goal[0], goal[1]))
-            inside = [0 <= c < cost.shape[0] and 0 <= r < cost.shape[1] for c, r in ahead]
+            inside = [0 <= c < self.cols and 0 <= r < self.rows for c, r in ahead]
             scores = [
                 self.prices[box[0], box[1], h] + cost[box] + 0.1 * ((h - turned) % 4 != 0) if ok else np.inf
                 for h, (box, ok) in enumerate(zip(ahead, inside, strict=True))
