@@ -15,7 +15,9 @@ use crate::series::MetricSeries;
 use crate::simulation::Simulation;
 use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId};
-use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
+use crate::view::{
+    BodyId, Frame, FrameOptions, GridTeam, Inspection, PositionTableColumns, Scenery,
+};
 use crate::world::{
     CheckpointableWorld, ControllableWorld, DecisionMode, RecordableWorld, World, WorldMetrics,
     WorldView,
@@ -496,6 +498,10 @@ where
 
     fn inspect(&self, body: BodyId) -> Option<Inspection> {
         self.world.inspect(&self.state, &self.collector, self.cycle, body)
+    }
+
+    fn grid_team(&self, tasks_from: u64) -> Result<GridTeam, [String; 2]> {
+        self.world.grid_team(&self.state, self.cycle, tasks_from)
     }
 
     fn agent_teams(&self) -> &[AgentTeam] {

@@ -11,7 +11,9 @@ use crate::ports::{RecordError, Recorder, TableSchema};
 use crate::run_config::RunConfig;
 use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId};
-use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
+use crate::view::{
+    BodyId, Frame, FrameOptions, GridTeam, Inspection, PositionTableColumns, Scenery,
+};
 use crate::world::DecisionMode;
 use std::any::Any;
 
@@ -94,6 +96,16 @@ pub trait Simulation: Any + Send {
     /// Returns the percepts and decisions of a body in the next cycle, and their outcome; `None` for a body that does
     /// not exist or has nothing to show. No result depends on it.
     fn inspect(&self, body: BodyId) -> Option<Inspection>;
+
+    /// Returns the agents as formats of multi-agent path finding show them, with the errands of all tasks from the number
+    /// `tasks_from` on. No result depends on it.
+    ///
+    /// # Errors
+    /// When they cannot be shown so: the cause, and a remedy.
+    fn grid_team(&self, _tasks_from: u64) -> Result<GridTeam, [String; 2]> {
+        let cause = "it was recorded by another build, and can only be shown".to_string();
+        Err([cause, "run its scenario again with this program".to_string()])
+    }
 
     /// The teams of agents with the same observations and orders.
     fn agent_teams(&self) -> &[AgentTeam] {

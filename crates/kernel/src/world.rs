@@ -19,7 +19,9 @@ use crate::ports::{Clock, RecordError, Recorder, TableSchema};
 use crate::run_config::RunStats;
 use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId, EntitySlot};
-use crate::view::{BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery};
+use crate::view::{
+    BodyId, Frame, FrameOptions, GridTeam, Inspection, PositionTableColumns, Scenery,
+};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -261,6 +263,21 @@ pub trait WorldView: World {
         _: BodyId,
     ) -> Option<Inspection> {
         None
+    }
+
+    /// Returns the agents in cycle `now` as formats of multi-agent path finding show them, with the errands of all tasks
+    /// from the number `tasks_from` on.
+    ///
+    /// # Errors
+    /// When they cannot be shown so: the cause, and a remedy.
+    fn grid_team(
+        &self,
+        _: &Self::State,
+        _now: Cycle,
+        _tasks_from: u64,
+    ) -> Result<GridTeam, [String; 2]> {
+        let cause = format!("agents of the world {} are not on a grid", Self::NAME);
+        Err([cause, "export a run of robots".to_string()])
     }
 }
 

@@ -85,6 +85,11 @@ impl Dispatcher {
         self.tasks.goal(state, agent).map(|index| self.graph.position(index))
     }
 
+    /// Returns the places of a task, in order.
+    pub fn places(&self, task: u64) -> Vec<(u32, u32)> {
+        self.tasks.places(task).iter().map(|&index| self.graph.position(index)).collect()
+    }
+
     /// Notes which agents are at the places where they had to go, reveals new tasks, and gives tasks to agents without
     /// one. Returns the agents that have finished a task.
     ///

@@ -19,6 +19,7 @@ Examples:
   sidestep export runs/office --to csv              runs/office-csv/
   sidestep export runs/office --to parquet --table trajectories
   sidestep export runs/office --to mcap --every 10  for Foxglove
+  sidestep export runs/hall --to lorr               for PlanViz, the viewer of the League of Robot Runners
   sidestep export runs/office --to rosbag           odometry and scans for ROS 2
   sidestep export runs/office --to gif --from 1000 --until 2000
   sidestep export runs/office --to png --from 1234  one moment
@@ -42,6 +43,8 @@ enum ExportFormat {
     /// Paths of airplanes on earth, for maps (GeoJSON)
     #[value(name = "geojson")]
     GeoJson,
+    /// Robots and tasks in JSON, with the map, for the viewer of the League of Robot Runners
+    Lorr,
     /// Recording for Foxglove and other viewers: bodies, scans, events, places on earth
     Mcap,
     /// ROS 2 bag: odometry, true poses and scans of robots, and the map
@@ -64,6 +67,7 @@ impl ExportFormat {
             Self::Csv => "csv",
             Self::Parquet => "parquet",
             Self::GeoJson => "geojson",
+            Self::Lorr => "lorr",
             Self::Mcap => "mcap",
             Self::RosBag => "rosbag",
             Self::Svg => "svg",
@@ -177,6 +181,7 @@ fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
         ExportFormat::Csv => export::Format::Csv(args.table.clone()),
         ExportFormat::Parquet => export::Format::Parquet(args.table.clone()),
         ExportFormat::GeoJson => export::Format::GeoJson,
+        ExportFormat::Lorr => export::Format::League,
         ExportFormat::Mcap => export::Format::Mcap,
         ExportFormat::RosBag => export::Format::RosBag,
         ExportFormat::Svg => export::Format::Svg,
@@ -200,7 +205,9 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
     let format = args.to;
     let given = [
         ("--until", args.until.is_some(), !format.is_picture()),
-        ("--every", args.every.is_some(), !format.is_picture()),
+        // The viewer begins at tick 0, and has all ticks.
+        ("--from", args.from.is_some(), format != ExportFormat::Lorr),
+        ("--every", args.every.is_some(), !format.is_picture() && format != ExportFormat::Lorr),
         ("--table", args.table.is_some(), format.is_table()),
         ("--fps", args.fps.is_some(), format.is_animation()),
         ("--width", args.width.is_some(), format.is_animation() || format == ExportFormat::Png),

@@ -115,3 +115,153 @@ fn what_is_wrong_in_a_problem_is_told_with_its_place_and_a_remedy() {
         "copy the whole file",
     );
 }
+
+/// A pose as the League has it: row from the north, column, and heading, clockwise from east.
+type LeaguePose = [i64; 3];
+
+/// Returns the ticks of a path, each a letter, after a check of what its segments say of where the robot is.
+fn path_letters(path: &str, ticks: usize) -> Vec<char> {
+    let mut letters = Vec::new();
+    for segment in path.split_terminator(")]") {
+        let (head, actions) = segment.split_once("):(").expect("a head");
+        let (tick, _) = head.trim_start_matches("[(").split_once(',').expect("a tick");
+        assert_eq!(tick.parse(), Ok(letters.len()), "{path}");
+        for action in actions.split(',') {
+            let (letter, count) = action.split_once(' ').expect("a letter and a number");
+            let letter = letter.chars().next().expect("a letter");
+            letters.extend(std::iter::repeat_n(letter, count.parse().expect("a number")));
+        }
+    }
+    assert_eq!(letters.len(), ticks);
+    letters
+}
+
+/// Returns the pose in which a robot begins each tick, or to which its action leads it: as a run records them.
+fn followed(
+    start: &serde_json::Value,
+    letters: &[char],
+    ticks_per_action: usize,
+) -> Vec<LeaguePose> {
+    let heading = "ESWN".find(start[2].as_str().expect("a heading")).expect("one of four");
+    let number = |at: usize| start[at].as_i64().expect("a number");
+    let mut pose = [number(0), number(1), heading as i64];
+    let mut done = 0;
+    let mut poses = Vec::new();
+    let mut letter_before = 'W';
+    for &letter in letters {
+        let is_in_action = done > 0;
+        let shown = if is_in_action { after(pose, letter_before) } else { pose };
+        poses.push(shown);
+        if letter == 'W' {
+            continue;
+        }
+        assert!(!is_in_action || letter == letter_before, "an action is carried to its end");
+        letter_before = letter;
+        done += 1;
+        if done == ticks_per_action {
+            pose = after(pose, letter);
+            done = 0;
+        }
+    }
+    poses
+}
+
+fn after([row, col, heading]: LeaguePose, letter: char) -> LeaguePose {
+    let [south, east] = [[0, 1], [1, 0], [0, -1], [-1, 0]][heading as usize];
+    match letter {
+        'F' => [row + south, col + east, heading],
+        'R' => [row, col, (heading + 1) % 4],
+        'C' => [row, col, (heading + 3) % 4],
+        _ => panic!("{letter} is no action of the League"),
+    }
+}
+
+#[test]
+fn an_exported_run_follows_the_leagues_actions_to_the_recorded_poses() {
+    const TICKS: usize = 1203;
+    let place = problem_folder(AGENTS, TASKS);
+    let run = place.json(&["run", "p.json", "--cycles", &TICKS.to_string(), "--out", "r"]);
+    let written = place.json(&["export", "r", "--to", "lorr"]);
+    assert_eq!(written["digest_confirmed"], true, "{written}");
+    assert_eq!(place.read("r-lorr/map.map"), MAP.replace('T', "@"));
+    let output: serde_json::Value =
+        serde_json::from_str(&place.read("r-lorr/output.json")).expect("JSON");
+    assert_eq!(output["version"], "2026 LoRR");
+    assert_eq!([&output["teamSize"], &output["makespan"]], [3, TICKS]);
+    assert_eq!(output["agentMaxCounter"], 3);
+    place.run(&["export", "r", "--to", "csv", "--table", "trajectories", "--out", "t.csv"]);
+    let table = place.read("t.csv");
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|row| row.split(',').collect()).collect();
+    let mut moves = 0;
+    for robot in 0..3 {
+        let path = output["actualPaths"][robot].as_str().expect("text");
+        let letters = path_letters(path, TICKS);
+        moves += letters.iter().filter(|letter| **letter == 'F').count();
+        let poses = followed(&output["start"][robot], &letters, 3);
+        let name = robot.to_string();
+        let recorded = rows.iter().filter(|row| row[1] == name).map(|row| -> LeaguePose {
+            let number = |at: usize| row[at].parse::<i64>().expect("a number");
+            let names = ["east", "south", "west", "north"];
+            let heading = names.iter().position(|name| *name == row[4]).expect("a heading");
+            [3 - number(3), number(2), heading as i64]
+        });
+        assert!(recorded.eq(poses.iter().copied().take(TICKS)), "robot {robot}");
+        let planned = output["plannerPaths"][robot].as_str().expect("text");
+        path_letters(planned, TICKS);
+    }
+    assert!(moves > 300, "{moves}");
+    assert_tasks_are_told(&output, &run);
+}
+
+/// The events of an exported file end as many tasks as the run has finished, and each errand is where its robot is.
+fn assert_tasks_are_told(output: &serde_json::Value, run: &serde_json::Value) {
+    let finished = run["metrics"]["tasks_finished"].as_u64().expect("a number");
+    assert!(finished > 20, "{finished}");
+    assert_eq!(output["numTaskFinished"], finished);
+    let list = |key: &str| output[key].as_array().expect("a list").clone();
+    let tasks = list("tasks");
+    let mut ended = 0;
+    for event in list("events") {
+        let number = |at: usize| event[at].as_u64().expect("a number") as usize;
+        let [tick, robot, task, errands] = [0, 1, 2, 3].map(number);
+        let path = output["actualPaths"][robot].as_str().expect("text");
+        let letters = path_letters(path, output["makespan"].as_u64().expect("a number") as usize);
+        let at = followed(&output["start"][robot], &letters, 3)[tick];
+        let places = tasks[task][2].as_array().expect("a list");
+        let place = &places[2 * errands - 2..2 * errands];
+        assert_eq!([&place[0], &place[1]], [at[0], at[1]], "{event}");
+        assert!(tasks[task][1].as_u64() < Some(tick as u64), "{event}");
+        ended += u64::from(2 * errands == places.len());
+    }
+    assert_eq!(ended, finished);
+    let delayed: u64 = list("delayIntervals")
+        .iter()
+        .flat_map(|robot| robot.as_array().expect("a list").clone())
+        .map(|span| span[1].as_u64().expect("a tick") - span[0].as_u64().expect("a tick"))
+        .sum();
+    assert!(delayed > 0);
+    assert_eq!(run["metrics"]["delayed_cycles"], delayed);
+}
+
+#[test]
+fn robots_that_the_league_does_not_know_are_refused_by_name() {
+    let place = TestFolder::new();
+    let text = "format = 1\nworld = \"robots\"\ncycles = 40\n[map]\nascii = \"........\\n........\"\n\
+                [robots]\nat = [[2, 0, 0]]\n";
+    place.write("one.toml", text);
+    place.json(&["run", "one.toml", "--out", "one"]);
+    place.json(&["export", "one", "--to", "lorr", "--until", "20"]);
+    let output: serde_json::Value =
+        serde_json::from_str(&place.read("one-lorr/output.json")).expect("JSON");
+    assert_eq!(output["makespan"], 20);
+    assert_eq!(output["tasks"], serde_json::json!([[0, 0, [1, 2]]]), "the viewer needs one");
+    assert_eq!(output["actualSchedule"], serde_json::json!(["0:-1"]));
+    place.write("two.toml", text.replace("\nat =", "\nsize = 2\nat ="));
+    place.json(&["run", "two.toml", "--out", "two"]);
+    let refused = place.run(&["export", "two", "--to", "lorr"]);
+    assert_eq!(refused.code(), 2, "{}", refused.err());
+    assert!(refused.err().contains("robot 0 fills 2 x 2 boxes"), "{}", refused.err());
+    let from = place.run(&["export", "one", "--to", "lorr", "--from", "3"]);
+    assert!(from.err().contains("--from: means nothing for --to lorr"), "{}", from.err());
+    assert!(!place.names().iter().any(|name| name == "two-lorr"), "nothing is written");
+}

@@ -8,6 +8,7 @@ mod appearance;
 mod body;
 mod color;
 mod earth;
+mod grid_team;
 mod inspect;
 mod kind;
 mod log;
@@ -21,6 +22,7 @@ pub use color::{
     body_color,
 };
 pub use earth::{EarthChart, EarthProjection, EarthReference};
+pub use grid_team::{GridAgent, GridPlace, GridTask, GridTeam};
 pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
 pub use kind::{BodyKind, BodyRole, KindSpec, Kinds, LegendTexts, Outline, Paint, TrailStyle};
 pub use log::{EventBuffer, LogEvent, LogEventKind, Quantity, Severity};

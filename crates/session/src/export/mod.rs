@@ -2,6 +2,7 @@
 //! else is computed again from the recorded scenario.
 
 mod geojson;
+mod league;
 mod pictures;
 mod tables;
 mod target;
@@ -22,6 +23,8 @@ pub enum Format {
     Parquet(Option<String>),
     /// Paths of airplanes on earth, for maps.
     GeoJson,
+    /// Robots, tasks and the map in the format of the League of Robot Runners, for its viewer.
+    League,
     /// Bodies, scans and events, for Foxglove and other viewers.
     Mcap,
     /// ROS 2 bag: odometry, true poses and scans of robots, with the map.
@@ -109,6 +112,7 @@ pub fn export(
             tables::export(&job, tables::TableFormat::Parquet, table.as_deref())
         }
         Format::GeoJson => geojson::export(&job),
+        Format::League => league::export(&job),
         Format::Mcap => export_mcap(&job),
         Format::RosBag => export_bag(&job),
         Format::Svg => pictures::export_svg(&job),

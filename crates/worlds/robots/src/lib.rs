@@ -32,6 +32,7 @@ mod errands;
 pub mod exact;
 mod external;
 mod facts;
+mod grid_team;
 mod import;
 mod inspect;
 mod join;

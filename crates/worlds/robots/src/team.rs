@@ -6,7 +6,8 @@ use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
 use sidestep_planners::tasks::TaskState;
 use sidestep_planners::{
-    Dispatcher, Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState, TeamTasks,
+    Dispatcher, GridPose, Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState,
+    TeamTasks,
 };
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -124,6 +125,11 @@ impl TeamState {
     /// Returns how often a robot was elsewhere than planned.
     pub(crate) fn off_plan(&self, robot: usize) -> u32 {
         lock(&self.memory).off_plan[robot]
+    }
+
+    /// Returns the pose that a robot has after its planned action.
+    pub(crate) fn planned(&self, robot: usize) -> Option<GridPose> {
+        lock(&self.memory).planned[robot]
     }
 
     /// Returns what became of the plans so far.

@@ -16,7 +16,7 @@ use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::text::{JsonTextReport, KeyValues};
 use sidestep_kernel::view::{
-    BodyId, Frame, FrameOptions, Inspection, PositionTableColumns, Scenery,
+    BodyId, Frame, FrameOptions, GridTeam, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
     CheckpointableWorld, ControllableWorld, Cycle, Digest, InputError, RecordableWorld, Run,
@@ -229,6 +229,15 @@ impl WorldView for RobotsWorld {
         body: BodyId,
     ) -> Option<Inspection> {
         RobotsWorld::inspect(self, state, now, body)
+    }
+
+    fn grid_team(
+        &self,
+        state: &RobotsState,
+        now: Cycle,
+        tasks_from: u64,
+    ) -> Result<GridTeam, [String; 2]> {
+        RobotsWorld::grid_team(self, state, now, tasks_from)
     }
 }
 
