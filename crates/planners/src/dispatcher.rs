@@ -8,6 +8,7 @@ use crate::pose::GridPose;
 use crate::tasks::{TaskList, TaskPolicy, TaskState};
 use sidestep_kernel::InputError;
 use sidestep_map::planning::FreeSpace;
+use std::collections::BTreeSet;
 
 /// Most pairs of agents and tasks for which tasks are given anew whenever there are new ones.
 const MAX_PAIRS: usize = 1 << 18;
@@ -88,6 +89,21 @@ impl Dispatcher {
     /// Returns the places of a task, in order.
     pub fn places(&self, task: u64) -> Vec<(u32, u32)> {
         self.tasks.places(task).iter().map(|&index| self.graph.position(index)).collect()
+    }
+
+    /// Returns the tasks of the list that no agent which starts at one of some places can carry out, because it cannot
+    /// come to all of their places.
+    pub fn tasks_out_of_reach(&self, starts: &[(u32, u32)]) -> Vec<u64> {
+        let label = |index: u32| self.labels[index as usize];
+        let boxes = starts.iter().filter_map(|&start| self.graph.anchor(start));
+        let starts: BTreeSet<u32> = boxes.map(label).collect();
+        let is_out_of_reach = |&task: &u64| {
+            let places = self.tasks.places(task);
+            let first = places.first().map(|&place| label(place));
+            let is_whole = places.iter().all(|&place| Some(label(place)) == first);
+            !is_whole || first.is_some_and(|first| !starts.contains(&first))
+        };
+        (0..self.tasks.count() as u64).filter(is_out_of_reach).collect()
     }
 
     /// Notes which agents are at the places where they had to go, reveals new tasks, and gives tasks to agents without
@@ -189,6 +205,14 @@ mod tests {
         assert_eq!(dispatcher.goal(&state, 0), Some((4, 0)));
         assert_eq!(dispatcher.goal(&state, 1), None, "nobody can come to (7, 0)");
         assert_eq!(state.open, [1]);
+    }
+
+    #[test]
+    fn a_task_is_out_of_reach_without_a_start_from_where_all_of_its_places_are_reached() {
+        let tasks = team(vec![vec![(4, 0)], vec![(7, 0)], vec![(4, 0), (6, 0)]]);
+        let dispatcher = Dispatcher::new(&free(), 1, &tasks).expect("fits");
+        assert_eq!(dispatcher.tasks_out_of_reach(&[(0, 0), (1, 0)]), [1, 2]);
+        assert_eq!(dispatcher.tasks_out_of_reach(&[(0, 0), (6, 0)]), [2]);
     }
 
     #[test]

@@ -67,6 +67,11 @@ impl<P: Copy + PartialEq> TaskList<P> {
         TaskState { revealed: 0, open: Vec::new(), agents: vec![None; agents], finished: 0 }
     }
 
+    /// Returns the number of tasks in the list.
+    pub fn count(&self) -> usize {
+        self.tasks.len()
+    }
+
     /// Returns the places of a task, in order.
     pub fn places(&self, task: u64) -> &[P] {
         &self.tasks[(task % self.tasks.len() as u64) as usize]

@@ -196,7 +196,9 @@ impl<'a> Compiler<'a> {
             Placer { source: Arc::clone(&self.source), map: Arc::clone(&self.map), groups, sizes };
         let placed = placer.place(&self.streams)?;
         let firsts = placer.first_ids();
-        self.warn_of_unreachable_goals(placer.groups.iter().zip(firsts).take(robots), &placed);
+        let sections = placer.groups.iter().zip(firsts).take(robots);
+        self.warn_of_unreachable_goals(sections.clone(), &placed);
+        self.warn_of_unreachable_tasks(sections, &placed);
         self.finish(order, placer, placed)
     }
 

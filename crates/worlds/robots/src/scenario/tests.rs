@@ -192,6 +192,25 @@ fn an_effector_that_was_learned_for_other_boxes_is_refused() {
     assert!(error.remedy().contains("--box 0.5"), "{error}");
 }
 
+#[test]
+fn a_task_that_no_robot_can_come_to_is_a_warning_with_its_errands() {
+    let of = |list: &str| {
+        let robots = format!(
+            "[map]\nascii = \"....#..\"\n[robots]\nat = [[0, 0, 0], [1, 0, 0]]\n\
+             planner = {{ method = \"pibt\" }}\ntasks = {{ list = {list} }}\n"
+        );
+        let text = format!("format = 1\nworld = \"robots\"\n{robots}");
+        remarks(&text, Path::new(""))
+    };
+    let told = of("[[[3, 0]], [[2, 0], [6, 0]], [[5, 0]]]");
+    assert_eq!(told[0].severity, Severity::Warning);
+    assert_eq!(told[0].key, "robots.0.tasks");
+    let words = &told[0].words;
+    assert!(words.starts_with("no robot can ever carry out 2 of 3 tasks"), "{words}");
+    assert!(words.contains("the errands [[2, 0], [6, 0]]"), "{words}");
+    assert!(of("[[[3, 0]], [[2, 0]]]").iter().all(|remark| remark.severity != Severity::Warning));
+}
+
 fn first_remark_on_map(folder: &Path, file: &str) -> Remark {
     let map = format!("[map]\nfile = \"{file}\"\nbox_size_m = 0.5\n[robots]\ncount = 1\n");
     remarks(&text("", &map), folder).remove(0)

@@ -1,8 +1,9 @@
-//! Remarks that need the sections of a scenario: on effectors, and on goals out of reach.
+//! Remarks that need the sections of a scenario: on effectors, and on goals and tasks out of reach.
 
 use super::super::RobotsFile;
 use super::bodies::BodyGroup;
 use super::*;
+use sidestep_planners::Dispatcher;
 
 /// Returns warnings of effectors that move otherwise than their author may expect.
 pub(super) fn effector_remarks(
@@ -121,6 +122,37 @@ impl Compiler<'_> {
                      between it and their start, or the way is too narrow for them"
                 );
                 self.remarks.push(Remark::warning(format!("robots.{k}"), words));
+            }
+        }
+    }
+
+    /// Warns of tasks that none of the robots which have them can ever carry out; `groups` are as those of goals.
+    pub(super) fn warn_of_unreachable_tasks<'g>(
+        &mut self,
+        groups: impl Iterator<Item = (&'g BodyGroup, EntityId)>,
+        placed: &Placement,
+    ) {
+        let free = FreeSpace::from_map(&self.map);
+        for (k, (group, first)) in groups.enumerate() {
+            let Some(tasks) = &group.tasks else { continue };
+            let ids = first..first + group.count as EntityId;
+            let starts: Vec<(u32, u32)> = ids.map(|id| placed.start[id as usize].0).collect();
+            let Some(body) = placed.bodies.get(first as usize) else { continue };
+            let size = self.types[usize::from(body.ty)].size.0;
+            // The errands were checked: bodies fit there.
+            let Ok(dispatcher) = Dispatcher::new(&free, size, tasks) else { continue };
+            let missed = dispatcher.tasks_out_of_reach(&starts);
+            if let Some(&task) = missed.first() {
+                let errands: Vec<[u32; 2]> =
+                    dispatcher.places(task).into_iter().map(<[u32; 2]>::from).collect();
+                let words = format!(
+                    "no robot can ever carry out {} of {} tasks; they stay open, and fewer others are known. The first \
+                     one has the errands {errands:?}: walls are between them and all starts, or the way is too narrow. Give \
+                     errands that a robot can come to",
+                    missed.len(),
+                    tasks.tasks.len(),
+                );
+                self.remarks.push(Remark::warning(format!("robots.{k}.tasks"), words));
             }
         }
     }
