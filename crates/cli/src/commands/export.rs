@@ -19,7 +19,7 @@ Examples:
   sidestep export runs/office --to csv              runs/office-csv/
   sidestep export runs/office --to parquet --table trajectories
   sidestep export runs/office --to mcap --every 10  for Foxglove
-  sidestep export runs/hall --to lorr               for PlanViz, the viewer of the League of Robot Runners
+  sidestep export runs/hall --to lorr               for PlanViz of the League
   sidestep export runs/office --to rosbag           odometry and scans for ROS 2
   sidestep export runs/office --to gif --from 1000 --until 2000
   sidestep export runs/office --to png --from 1234  one moment
