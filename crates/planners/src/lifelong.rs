@@ -114,8 +114,9 @@ impl Lifelong {
         Ok((Self { planner, config, tasks }, state))
     }
 
-    /// Returns whether the steps to the goals of all agents fit in [`LifelongConfig::max_field_bytes`]. Where they do not,
-    /// agents go straight toward their goals and can stick behind walls.
+    /// Returns whether the steps to the goals of all agents, at least from region to region, fit in
+    /// [`LifelongConfig::max_field_bytes`]. Where they do not, agents go straight toward their goals and can stick behind
+    /// walls.
     pub fn plans_around_walls(&self) -> bool {
         self.planner.has_fields
     }

@@ -82,9 +82,9 @@ pub struct TickPlanner {
 }
 
 impl TickPlanner {
-    /// Creates the planner of so many agents whose step or turn takes so many ticks. Steps to goals are known where
-    /// those of all agents fit in `max_field_bytes`; otherwise agents go straight toward their goals, and can stick
-    /// behind walls.
+    /// Creates the planner of so many agents whose step or turn takes so many ticks. The steps to the goals of all agents
+    /// are kept from each box where that fits in `max_field_bytes`, else from region to region, by which ways are not always
+    /// the shortest. Where not even that fits, agents go straight toward their goals, and can stick behind walls.
     pub fn new(
         free: &FreeSpace,
         agents: usize,
@@ -122,6 +122,7 @@ impl TickPlanner {
     /// When there are not as many agents and goals as the planner is for.
     pub fn step(&mut self, situation: TickSituation<'_>) -> &[Action] {
         let TickSituation { tick, agents, goals, others } = situation;
+        // However long it takes: what is known must not depend on the steps before.
         self.fields.begin_tick(usize::MAX);
         self.hold(agents, others);
         for (own, goal) in self.goals.iter_mut().zip(goals) {

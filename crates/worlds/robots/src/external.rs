@@ -202,7 +202,10 @@ impl RobotsWorld {
         if !model.is_ordered {
             return;
         }
-        for (team, team_state) in self.planner_teams.iter().zip(&state.planner_teams) {
+        let teams = self.planner_teams.iter().zip(&state.planner_teams);
+        // Robots of one section are all in one team, but a team may have several sections.
+        let shown = teams.filter(|(team, _)| agents.binary_search(&team.robots.start).is_ok());
+        for (team, team_state) in shown {
             let goals = self.goals_ahead(state, team, team_state);
             for (id, goal) in team.robots.clone().zip(goals) {
                 let Ok(row) = agents.binary_search(&id) else { continue };

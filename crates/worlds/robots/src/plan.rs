@@ -87,6 +87,7 @@ impl RobotsWorld {
     ) {
         for (robot, id) in team.robots.clone().enumerate() {
             let order = &state.body(id).memory;
+            // As those that a planner leads, it waits before a box that is still held.
             if self.is_kept_out(state, id) && decide::Avoidance::ordered(order) == FORWARD {
                 decide::Avoidance::order(order, STAY);
             }
