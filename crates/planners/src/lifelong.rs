@@ -1,7 +1,7 @@
 //! Agents that carry out tasks without end, tick by tick, although some are late.
 //!
 //! A step forward or a turn takes several ticks. An agent on its way from one box to the next holds both, and nobody
-//! enters a box that is held ([`crate::tick_planner`]): so no two bodies overlap, whatever the delays. A delayed agent
+//! enters a box that is held ([`TickPlanner`]): so no two bodies overlap, whatever the delays. A delayed agent
 //! stands still, in the midst of an action or between two.
 
 use crate::assignment::CostMatrix;

@@ -26,7 +26,7 @@ const ACTIONS_WITHOUT_PLAN: u64 = 8;
 /// The algorithm by which a team plans.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Method {
-    /// Priority inheritance with backtracking ([`Pibt`]): one step at a time, without an executor.
+    /// Priority inheritance with backtracking ([`Pibt`](crate::Pibt)): one step at a time, without an executor.
     Pibt,
     /// [`lacam`]: a first plan at once, then better ones within the budget.
     Lacam {
@@ -176,7 +176,7 @@ impl TeamPlanner {
     /// Returns the next action of each agent, and advances the state by one step.
     ///
     /// # Errors
-    /// As [`Pibt::step`].
+    /// As [`Pibt::step`](crate::Pibt::step).
     pub fn step(
         &mut self,
         state: &mut TeamPlannerState,
