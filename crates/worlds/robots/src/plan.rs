@@ -86,6 +86,11 @@ impl RobotsWorld {
         poses: &[GridPose],
     ) {
         for (robot, id) in team.robots.clone().enumerate() {
+            // Its order stands until it can act.
+            if state.delays.remaining(id) > 0 || state.action_progress.left(id) > 0 {
+                memory.planned[robot] = Some(poses[robot]);
+                continue;
+            }
             let order = &state.body(id).memory;
             // As those that a planner leads, it waits before a box that is still held.
             if self.is_kept_out(state, id) && decide::Avoidance::ordered(order) == FORWARD {

@@ -398,3 +398,13 @@ fn a_run_that_is_led_from_outside_is_the_same_from_its_orders_and_when_it_is_res
         assert_eq!(after.digest(), first.digest(), "resumed at {at}");
     }
 }
+
+#[test]
+fn a_robot_that_is_late_or_in_an_action_is_where_its_planner_outside_knows_it_to_be() {
+    let text = LED.replace("effector = \"late\"", "effector = \"punctual\"")
+        + "[effectors.punctual]\nforward = [{ p = 1.0, path = \"F\" }]\n";
+    let mut run = robots_run(&source(&text), 1).expect("it compiles");
+    led(&mut run, 100);
+    assert!(run.metrics().total.distance_m > 0.0);
+    assert_eq!(run.metrics().total.off_plan, 0, "no wheel slips, and nobody meets another");
+}
