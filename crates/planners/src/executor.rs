@@ -54,6 +54,8 @@ pub(crate) struct Execute<'a> {
     pub(crate) graph: &'a DependencyGraph,
     /// Whether an agent can enter a box that another one leaves in the same step.
     pub(crate) may_follow: bool,
+    /// Whether an agent may turn out to be behind where it was taken to be.
+    pub(crate) may_fall_back: bool,
     /// Steps that an action takes.
     pub(crate) action_steps: u32,
 }
@@ -87,12 +89,18 @@ impl Execution {
                 self.stall_steps = 0;
                 continue;
             }
-            let before = match done.checked_sub(1) {
+            let pose_after = |done: usize| match done.checked_sub(1) {
                 Some(last) => graph.action(agent, last).map(|(_, after)| after),
                 None => Some(self.plan.pose(agent, 0)),
             };
-            if before != Some(pose) {
-                return false;
+            if pose_after(done) == Some(pose) {
+                continue;
+            }
+            let earlier = if by.may_fall_back { 0..done } else { 0..0 };
+            let mut earlier = earlier.rev();
+            match earlier.find(|&done| pose_after(done) == Some(pose)) {
+                Some(done) => *progress = done as u32,
+                None => return false,
             }
         }
         !self.is_stalled(by)
@@ -117,6 +125,34 @@ impl Execution {
             .map(|(agent, &pose)| pose.steps_off(self.plan.pose(agent, step)))
             .max()
             .unwrap_or(0)
+    }
+
+    /// Returns the poses that are still ahead of an agent, from the one that its plan has for it now.
+    pub(crate) fn path_ahead(&self, by: &Execute<'_>, agent: usize) -> Vec<GridPose> {
+        if by.executor != Executor::Adg {
+            let step = (self.step as usize).min(self.plan.steps());
+            return self.plan.path(agent)[step..].to_vec();
+        }
+        let done = self.progress[agent] as usize;
+        let pose_after = |index: usize| by.graph.action(agent, index).map(|(_, pose)| pose);
+        let before = done.checked_sub(1).and_then(pose_after);
+        let mut path = vec![before.unwrap_or(self.plan.pose(agent, 0))];
+        path.extend((done..by.graph.actions(agent)).filter_map(pose_after));
+        path
+    }
+
+    /// Returns the agents, by rising number, that have to do an action before an agent may do its next one.
+    pub(crate) fn agents_before(&self, by: &Execute<'_>, agent: usize) -> Vec<usize> {
+        let index = self.progress[agent] as usize;
+        if by.executor != Executor::Adg || index >= by.graph.actions(agent) {
+            return Vec::new();
+        }
+        let is_open = |&(other, action): &(usize, usize)| self.progress[other] as usize <= action;
+        let open = by.graph.dependencies(agent, index).filter(is_open);
+        let mut others: Vec<usize> = open.map(|(other, _)| other).collect();
+        others.sort_unstable();
+        others.dedup();
+        others
     }
 
     /// Returns whether the plan has no steps left, whoever has done them.

@@ -8,7 +8,7 @@ use crate::instance::{Agent, Instance, check_sizes};
 use crate::lacam::{self, LacamConfig};
 use crate::pibt::PibtState;
 use crate::plan::Plan;
-use crate::pose::{Action, ActionModel};
+use crate::pose::{Action, ActionModel, GridPose};
 use crate::stepper::Stepper;
 pub use crate::stepper::{BusyAgent, TeamStep};
 use crate::{cbs, prioritized};
@@ -46,6 +46,9 @@ pub enum Method {
     /// A plan that was made elsewhere, from the first step on; where it ends, or cannot be carried out any more, priority
     /// inheritance leads.
     Given(Arc<Plan>),
+    /// Plans that a caller orders one after the other, see [`TeamPlannerState::ordered`]. Where one ends, or cannot be carried
+    /// out any more, all wait for the next.
+    Ordered,
 }
 
 /// The settings of a [`TeamPlanner`].
@@ -63,6 +66,9 @@ pub struct TeamPlannerConfig {
     /// Steps that an action takes, in which a body also holds the boxes that it leaves. Above 1 agents get out of step, so
     /// only [`Method::Pibt`] and [`Executor::Adg`] lead them well.
     pub action_steps: u32,
+    /// Whether an agent may turn out to be behind where it was taken to be, since poses are beliefs: what has to be done
+    /// again by [`Executor::Adg`] is taken back, and the plan kept.
+    pub may_fall_back: bool,
     /// The seed of all draws.
     pub seed: Seed,
 }
@@ -104,6 +110,10 @@ pub struct TeamPlannerState {
     pub next_search: u64,
     /// What became of the plans so far.
     pub counts: PlanCounts,
+    /// For each agent, the actions of a plan of [`Method::Ordered`] that the next step begins with, from where the agents are
+    /// then; agents with fewer than others wait at the end. One that is wrong counts as a failure, and all wait.
+    #[serde(default)]
+    pub ordered: Option<Vec<Vec<Action>>>,
     /// The order of the plan's actions, which follows from the plan.
     #[serde(skip)]
     graph: Option<Arc<DependencyGraph>>,
@@ -116,6 +126,7 @@ impl PartialEq for TeamPlannerState {
             && self.execution == other.execution
             && self.next_search == other.next_search
             && self.counts == other.counts
+            && self.ordered == other.ordered
     }
 }
 
@@ -192,14 +203,41 @@ impl TeamPlanner {
                 state.pibt.step += 1;
                 return Ok(&self.actions);
             }
+            if self.config.method == Method::Ordered {
+                state.pibt.goals.copy_from_slice(now.goals);
+                state.pibt.step += 1;
+                self.actions = vec![Action::Wait; now.poses.len()];
+                return Ok(&self.actions);
+            }
         } else {
             state.counts.plans += 1;
         }
         self.stepper.step(&mut state.pibt, now)
     }
 
+    /// Returns the poses that a plan still has for an agent after [`Self::step`], from the present one on; none without a
+    /// plan.
+    pub fn path_ahead(&self, state: &TeamPlannerState, agent: usize) -> Vec<GridPose> {
+        let (Some(execution), Some(graph)) = (&state.execution, &state.graph) else {
+            return Vec::new();
+        };
+        execution.path_ahead(&self.execute(graph), agent)
+    }
+
+    /// Returns the agents for which an agent waits by the order of its plan, by rising number.
+    pub fn agents_before(&self, state: &TeamPlannerState, agent: usize) -> Vec<usize> {
+        let (Some(execution), Some(graph)) = (&state.execution, &state.graph) else {
+            return Vec::new();
+        };
+        execution.agents_before(&self.execute(graph), agent)
+    }
+
     /// Drops the plan if it cannot go on or its time is over, and makes another one if it is time for that.
     fn renew(&self, state: &mut TeamPlannerState, now: TeamStep<'_>) {
+        if let Some(actions) = state.ordered.take() {
+            self.begin_ordered(state, now.poses, &actions);
+            return;
+        }
         if let Some(execution) = &mut state.execution {
             let graph = state.graph.take().or_else(|| self.graph_of(&execution.plan).map(Arc::new));
             let goes_on = graph.as_ref().is_some_and(|graph| {
@@ -217,7 +255,11 @@ impl TeamPlanner {
             }
             state.execution = None;
         }
-        let is_spent = matches!(self.config.method, Method::Given(_)) && state.counts.plans > 0;
+        let is_spent = match self.config.method {
+            Method::Given(_) => state.counts.plans > 0,
+            Method::Ordered => true,
+            _ => false,
+        };
         if state.pibt.step < state.next_search || is_spent {
             return;
         }
@@ -236,6 +278,51 @@ impl TeamPlanner {
         state.graph = Some(Arc::new(graph));
     }
 
+    /// Begins with a plan that a caller has ordered.
+    fn begin_ordered(
+        &self,
+        state: &mut TeamPlannerState,
+        poses: &[GridPose],
+        actions: &[Vec<Action>],
+    ) {
+        state.counts.plans += 1;
+        state.execution = None;
+        let mut paths = Vec::with_capacity(poses.len());
+        for (&start, actions) in poses.iter().zip(actions) {
+            let mut path = vec![start];
+            // Off the map there are no poses: such a path is shorter than it should be.
+            path.extend(actions.iter().scan(start, |pose, &action| {
+                *pose = pose.after(action)?;
+                Some(*pose)
+            }));
+            if path.len() == actions.len() + 1 {
+                paths.push(path);
+            }
+        }
+        let is_whole = paths.len() == poses.len();
+        let plan = is_whole.then(|| Plan::new(paths));
+        let graph = plan.as_ref().and_then(|plan| self.graph_of(plan));
+        let (Some(plan), Some(graph)) = (plan, graph) else {
+            state.counts.failures += 1;
+            return;
+        };
+        state.execution = Some(Execution::new(plan));
+        state.graph = Some(Arc::new(graph));
+    }
+
+    /// Returns how many actions of its plan each agent still has to do in the next step, if that finds them at these poses.
+    pub fn actions_left(&self, state: &TeamPlannerState, poses: &[GridPose]) -> Vec<usize> {
+        let none = vec![0; poses.len()];
+        let Some(mut execution) = state.execution.clone() else { return none };
+        let graph = state.graph.clone().or_else(|| self.graph_of(&execution.plan).map(Arc::new));
+        let Some(graph) = graph else { return none };
+        let by = self.execute(&graph);
+        if !execution.advance(&by, poses) {
+            return none;
+        }
+        (0..poses.len()).map(|agent| execution.path_ahead(&by, agent).len() - 1).collect()
+    }
+
     /// Returns the steps by priority inheritance before the next search.
     fn steps_without_plan(&self) -> u64 {
         ACTIONS_WITHOUT_PLAN * u64::from(self.config.action_steps.max(1))
@@ -249,7 +336,7 @@ impl TeamPlanner {
         last_goals: &[Option<(u32, u32)>],
         now: TeamStep<'_>,
     ) -> bool {
-        if matches!(self.config.method, Method::Given(_)) {
+        if matches!(self.config.method, Method::Given(_) | Method::Ordered) {
             return execution.is_over(by);
         }
         let mut agents = now.poses.iter().zip(now.goals);
@@ -268,6 +355,7 @@ impl TeamPlanner {
             model: ActionModel::Turns,
             graph,
             may_follow: self.config.may_follow,
+            may_fall_back: self.config.may_fall_back,
             action_steps: self.config.action_steps,
         }
     }
@@ -348,7 +436,7 @@ impl TeamPlanner {
                 let outcome = cbs::plan(instance, budget_expansions)?;
                 Ok((outcome.plan, outcome.expansions))
             }
-            Method::Pibt | Method::Given(_) => Ok((None, 0)),
+            Method::Pibt | Method::Given(_) | Method::Ordered => Ok((None, 0)),
         }
     }
 

@@ -118,6 +118,12 @@ pub trait CompiledScenario: Send + Sync {
         SeedEffect::Decide
     }
 
+    /// Returns what somebody in it knows that no agent could know by itself, in words like "a planner knows all places":
+    /// tables mark it as privileged, because it is a bound rather than an equal of methods without that.
+    fn privilege(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Returns the scenario as stored in a run folder: complete, with all its files.
     ///
     /// # Errors

@@ -1060,7 +1060,7 @@ shape: MarkShape, };
 /**
  * The role of a mark in an inspection.
  */
-export type MarkRole = "true" | "reported" | "wish" | "done" | "refused" | "claim" | "group" | "predicted" | "chosen" | "known" | "orbit" | "target";
+export type MarkRole = "true" | "reported" | "wish" | "done" | "refused" | "claim" | "group" | "predicted" | "chosen" | "known" | "orbit" | "target" | "plan" | "wait";
 
 /**
  * The shape of a mark, in meters: a polyline, a polygon, a point, or a horizontal circle.

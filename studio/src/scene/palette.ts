@@ -90,4 +90,6 @@ export const ROLES: Record<MarkRole, { words: string; color: Rgb; dashed: boolea
   known: { words: "known", color: [204, 121, 167], dashed: true },
   orbit: { words: "stored orbit", color: [0, 114, 178], dashed: true },
   target: { words: "target", color: [213, 94, 0], dashed: true },
+  plan: { words: "plan", color: [0, 158, 115], dashed: true },
+  wait: { words: "waits for", color: [213, 94, 0], dashed: false },
 };

@@ -286,7 +286,9 @@ fn figure(groups: &RunGroups<'_>, metric: &RunColumn, title: String, x_label: St
 }
 
 fn means_note(groups: &RunGroups<'_>) -> String {
-    format!("Means with 95 % intervals, {}.", run_counts(groups))
+    let means = format!("Means with 95 % intervals, {}.", run_counts(groups));
+    let privilege_note = groups.privilege_note.map(|note| format!(" {note}"));
+    means + &privilege_note.unwrap_or_default()
 }
 
 /// Returns the number of runs of the variants as text.

@@ -66,6 +66,8 @@ pub(super) struct RunGroups<'a> {
     pub(super) seedless: Vec<bool>,
     /// Number of variants of which the metrics alone show that.
     pub(super) unseen: usize,
+    /// The note on variants in which somebody knows what no agent could.
+    pub(super) privilege_note: Option<&'a str>,
     /// Row of the table, by variant and replicate.
     run: BTreeMap<(usize, i64), usize>,
 }
@@ -75,7 +77,7 @@ impl<'a> RunGroups<'a> {
     /// metrics in words.
     pub(super) fn from_table(
         table: &'a RunTable,
-        options: &SummaryOptions,
+        options: &'a SummaryOptions,
     ) -> Result<Self, InputError> {
         table.check()?;
         let replicate_column = table.columns_with_role(Role::Replicate).next();
@@ -113,6 +115,7 @@ impl<'a> RunGroups<'a> {
             paired: replicate_column.is_some(),
             parameters: parameters(table, &run_of, variants.len()),
             meanings: options.meanings,
+            privilege_note: options.privilege_note.as_deref(),
             seedless,
             unseen: unseen.iter().filter(|is_unseen| **is_unseen).count(),
             variants,

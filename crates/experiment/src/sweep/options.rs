@@ -18,6 +18,8 @@ pub struct SummaryOptions {
     pub names: Option<Vec<String>>,
     /// Variants in which seeds change nothing: their one value has no interval.
     pub seedless: BTreeSet<String>,
+    /// The note on variants in which somebody knows what no agent could, for tables and figures.
+    pub privilege_note: Option<String>,
     /// Resamples, coverage and seed of bootstrap intervals.
     pub bootstrap: Bootstrap,
     /// The metrics in words.
@@ -49,6 +51,7 @@ impl Default for SummaryOptions {
             max_metrics: 12,
             against: None,
             seedless: BTreeSet::new(),
+            privilege_note: None,
             bootstrap: Bootstrap::default(),
             meanings: &[],
         }

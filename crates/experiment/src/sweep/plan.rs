@@ -48,6 +48,11 @@ pub struct Plan {
 /// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
 const MAX_SWEEP_RUNS: u64 = 10_000_000;
 
+/// The end of the name of a variant in which somebody knows what no agent could.
+const PRIVILEGE_MARK: &str = " *";
+/// Most variants that the note on these names.
+const MAX_PRIVILEGED_NAMES: usize = 6;
+
 impl Serialize for Plan {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         Self::serialize(self, to)
@@ -155,8 +160,40 @@ impl Plan {
         for name in names.iter_mut().filter(|name| name.is_empty()) {
             *name = unchanged.into();
         }
+        // Where all are, there is nothing to tell apart.
+        let has_equals = self.variants.iter().any(|variant| variant.privilege.is_none());
+        for (name, variant) in names.iter_mut().zip(&self.variants) {
+            if has_equals && variant.privilege.is_some() {
+                name.push_str(PRIVILEGE_MARK);
+            }
+        }
         number_duplicates(&mut names);
         names
+    }
+
+    /// Returns the note that explains the mark of variants in which somebody knows what no agent could; none without any.
+    pub fn privilege_note(&self) -> Option<String> {
+        let privileged: Vec<&Variant> =
+            self.variants.iter().filter(|variant| variant.privilege.is_some()).collect();
+        let mut reasons: Vec<&str> =
+            privileged.iter().filter_map(|variant| variant.privilege.as_deref()).collect();
+        reasons.sort_unstable();
+        reasons.dedup();
+        let reasons = reasons.join("; ");
+        if privileged.is_empty() {
+            return None;
+        }
+        let which = if privileged.len() == self.variants.len() {
+            "All variants are".into()
+        } else {
+            // In figures by parameter no name of a variant is seen.
+            let mut names = self.names();
+            names.retain(|name| name.ends_with(PRIVILEGE_MARK));
+            names.truncate(MAX_PRIVILEGED_NAMES);
+            let more = if privileged.len() > names.len() { ", and others" } else { "" };
+            format!("Variants with `*` ({}{more}) are", names.join("; "))
+        };
+        Some(format!("{which} privileged, a bound rather than an equal of others: {reasons}."))
     }
 
     /// Returns a setting in short, `method=pc`: with the whole path of its key only where another
@@ -345,6 +382,22 @@ mod tests {
             prop_assert_eq!(seen.len() as u64, plan.len());
             prop_assert_eq!(plan.trial_of(plan.len()), None);
         }
+    }
+
+    #[test]
+    fn privileged_variants_are_marked_and_explained_unless_all_are() {
+        let mut plan = plan(3, 1);
+        assert_eq!(plan.privilege_note(), None);
+        for variant in &mut plan.variants[1..] {
+            variant.privilege = Some("a planner knows all".into());
+        }
+        assert_eq!(plan.names(), ["n=0", "n=1 *", "n=2 *"]);
+        let note = plan.privilege_note().expect("some are");
+        assert!(note.starts_with("Variants with `*` (n=1 *; n=2 *) are privileged"), "{note}");
+        assert!(note.ends_with("others: a planner knows all."), "{note}");
+        plan.variants[0].privilege = Some("a planner knows all".into());
+        assert_eq!(plan.names(), ["n=0", "n=1", "n=2"]);
+        assert!(plan.privilege_note().expect("all are").starts_with("All variants are privileged"));
     }
 
     #[test]

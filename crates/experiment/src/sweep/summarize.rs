@@ -459,6 +459,7 @@ fn notes(
     against: Option<&BaselineChoice>,
 ) -> Vec<String> {
     let mut notes = Vec::new();
+    notes.extend(groups.privilege_note.map(String::from));
     notes.extend(unseen_note(groups));
     notes.extend(baseline_note(groups, against));
     notes.extend(test_notes(summary));

@@ -73,6 +73,10 @@ pub struct Variant {
     /// The effect of another seed on its runs.
     #[serde(default)]
     pub seeds: SeedEffect,
+    /// What somebody in it knows that no agent could, see
+    /// [`CompiledScenario::privilege`](sidestep_scenario::CompiledScenario::privilege).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub privilege: Option<String>,
     /// Its settings, beside those that all variants share.
     pub settings: Vec<Setting>,
 }

@@ -118,6 +118,10 @@ pub enum MarkRole {
     Orbit,
     /// Its destination.
     Target,
+    /// The path that it is to follow.
+    Plan,
+    /// From a body to one that it waits for.
+    Wait,
 }
 
 /// The shape of a mark in the frame of the world, in meters.
@@ -164,7 +168,7 @@ fn serialize_body_fields<S: Serializer>(
 
 impl MarkRole {
     /// Every role once, in the order of declaration.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::True,
         Self::Reported,
         Self::Wish,
@@ -177,6 +181,8 @@ impl MarkRole {
         Self::Known,
         Self::Orbit,
         Self::Target,
+        Self::Plan,
+        Self::Wait,
     ];
 }
 

@@ -1,7 +1,8 @@
 //! Verdicts on the questions of the study.
 
 use super::{
-    ALL_WHEELS, ALONE, ALONE_WITH_ERRORS, METHODS, MapResults, PIBT, SLIPPING_WHEELS, THROUGHPUT,
+    ALL_WHEELS, ALONE, ALONE_WITH_ERRORS, METHODS, MapResults, PIBT, PIBT_BY_REPORTS,
+    SLIPPING_WHEELS, THROUGHPUT,
 };
 use crate::claims::{ClaimsFile, PaperClaims, ThresholdTest, join_texts, judge_thresholds};
 use sidestep_document::Estimate;
@@ -42,6 +43,7 @@ pub(super) fn judge(maps: &[MapResults]) -> Vec<Claim> {
         judge_ratios("M-5", Side::Above, &ratios(maps, &ERRING_WHEELS, [ANEW, ORDERED])),
         judge_ratios("M-6", Side::Above, &ratios(maps, &ALL_WHEELS, [PIBT, ALONE])),
         judge_ratios("M-7", Side::Below, &ratios(maps, &ALL_WHEELS, [ALONE_WITH_ERRORS, ALONE])),
+        judge_ratios("M-8", Side::Above, &ratios(maps, &ALL_WHEELS, [PIBT_BY_REPORTS, ALONE])),
     ]
 }
 
@@ -192,7 +194,7 @@ mod tests {
             ("nomad", ALONE) => 4.5,
             (_, ALONE) => 5.0,
             (_, ALONE_WITH_ERRORS) => 4.0,
-            (_, PIBT) => 6.0,
+            (_, PIBT | PIBT_BY_REPORTS) => 6.0,
             ("perfect", ORDERED) => 9.0,
             (_, ORDERED) => 7.0,
             (_, ANEW) => 8.0,
@@ -200,7 +202,7 @@ mod tests {
         });
         // Who is best on perfect wheels is another one than on those that slip.
         assert_eq!(held[0], Verdict::Refuted);
-        assert_eq!(held[1..], [Verdict::Held; 6]);
+        assert_eq!(held[1..], [Verdict::Held; 7]);
         let refuted = verdicts(|wheels, method| match (wheels, method) {
             ("nomad", ALONE) => 2.0,
             (_, ALONE) => 9.0,
@@ -211,7 +213,7 @@ mod tests {
             (_, ANEW) => 5.0,
             _ => 1.0,
         });
-        assert_eq!(refuted[1..], [Verdict::Refuted; 6]);
+        assert_eq!(refuted[1..], [Verdict::Refuted; 7]);
         let same = verdicts(|_, method| {
             METHODS.iter().position(|m| *m == method).unwrap_or(0) as f64 + 1.0
         });
@@ -232,6 +234,6 @@ mod tests {
 
     #[test]
     fn what_made_no_trip_decides_nothing() {
-        assert_eq!(verdicts(|_, _| 0.0), [Verdict::Undecided; 7]);
+        assert_eq!(verdicts(|_, _| 0.0), [Verdict::Undecided; 8]);
     }
 }

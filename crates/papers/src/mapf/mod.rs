@@ -73,10 +73,11 @@ const ALL_WHEELS: [&str; 4] = ["perfect", "late", "nomad", "mrclam"];
 const SLIPPING_WHEELS: [&str; 2] = ["nomad", "mrclam"];
 
 /// The methods of the sweep, by their names here.
-const METHODS: [&str; 7] = [
+const METHODS: [&str; 8] = [
     ALONE,
     ALONE_WITH_ERRORS,
     PIBT,
+    PIBT_BY_REPORTS,
     "lacam, adg",
     "lacam, replan",
     "lacam, blind",
@@ -85,6 +86,10 @@ const METHODS: [&str; 7] = [
 const ALONE: &str = "alone";
 const ALONE_WITH_ERRORS: &str = "alone, sensors err";
 const PIBT: &str = "pibt";
+const PIBT_BY_REPORTS: &str = "pibt, reports";
+
+/// The mark of methods whose planner knows what no robot could.
+const PRIVILEGE_MARK: &str = " *";
 
 /// The name of throughput in results by seed.
 const THROUGHPUT: &str = "trips_in_1000_robot_cycles";
@@ -94,6 +99,7 @@ const COLUMNS: Columns = Columns {
         column("robots", "robots", Summary::Setting(ROBOTS)),
         column("wheels", "wheels", Summary::Setting(WHEELS)),
         column("method", "method", Summary::Computed(method)),
+        column("privileged", "privileged", Summary::Computed(privileged)),
     ],
     results: &[
         column("throughput", "trips in 1,000 robot-cycles", Summary::Computed(mean_throughput)),
@@ -113,6 +119,12 @@ const COLUMNS: Columns = Columns {
 /// Returns the method of a case, by the name of its variant.
 fn method(case: &CaseRuns<'_>) -> Value {
     Value::Word(case.variant().name.clone().expect("each method of the sweep has a name"))
+}
+
+/// Returns whether somebody in a case knows what no robot could.
+fn privileged(case: &CaseRuns<'_>) -> Value {
+    let is_privileged = case.variant().privilege.is_some();
+    Value::Word(if is_privileged { "yes" } else { "no" }.into())
 }
 
 /// Returns the trips there and back of a run in 1,000 robot-cycles.
@@ -205,8 +217,8 @@ impl MapResults {
     }
 
     fn table(&self) -> Table {
-        let note = "Sensors are right but for `alone, sensors err`. Planners know all places, and no robot that decides \
-                    alone does: that is a bound, not an equal.";
+        let note = "Sensors are right but for `alone, sensors err`. Privileged: a planner knows the true places of all \
+                    robots at any time, so it is a bound, and no equal of robots that decide alone.";
         COLUMNS.table(&format!("Map {}", self.map), note, &self.cases)
     }
 
@@ -214,14 +226,20 @@ impl MapResults {
     fn figure(&self, robots: u64) -> Figure {
         let mut series = Vec::with_capacity(METHODS.len());
         for method in METHODS {
-            let cases = ALL_WHEELS.iter().filter_map(|wheels| self.case(robots, wheels, method));
-            series.push(bars(method, cases, "throughput"));
+            let cases: Vec<&CaseResults> =
+                ALL_WHEELS.iter().filter_map(|wheels| self.case(robots, wheels, method)).collect();
+            let is_privileged = cases.iter().any(|case| case.has_text("privileged", "yes"));
+            let mark = if is_privileged { PRIVILEGE_MARK } else { "" };
+            series.push(bars(&format!("{method}{mark}"), cases.into_iter(), "throughput"));
         }
         let categories = ALL_WHEELS.map(String::from).to_vec();
         let labels = ["wheels", "trips in 1,000 robot-cycles"];
         let title = format!("Throughput on map {}, {robots} robots", self.map);
-        Figure { kind: FigureKind::Bars { categories }, ..figure(&title, labels, series) }
-            .with_interval_note()
+        let figure =
+            Figure { kind: FigureKind::Bars { categories }, ..figure(&title, labels, series) };
+        let figure = figure.with_interval_note();
+        let note = format!("{} `*`: privileged, the planner knows all true places.", figure.note);
+        Figure { note, ..figure }
     }
 }
 
@@ -270,10 +288,13 @@ mod tests {
                 }
             }
         }
-        assert_eq!(report.claims.len(), 7);
+        assert_eq!(report.claims.len(), 8);
         let document = report.document();
         assert!(document.blocks.contains(&Block::Claims(report.claims.clone())));
         let figures = document.blocks.iter().filter(|block| matches!(block, Block::Figure(_)));
         assert_eq!(figures.count(), 5);
+        let figure = report.maps[0].figure(20);
+        let names: Vec<&str> = figure.series.iter().map(|series| series.name.as_str()).collect();
+        assert_eq!(names[1..4], ["alone, sensors err", "pibt *", "pibt, reports"]);
     }
 }

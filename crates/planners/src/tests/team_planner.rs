@@ -1,7 +1,7 @@
 use super::floors::{Problem, problems};
 use crate::{
-    Executor, GridPose, Method, Plan, Seed, TeamPlanner, TeamPlannerConfig, TeamPlannerState,
-    TeamStep,
+    Action, Executor, GridPose, Method, Plan, Seed, TeamPlanner, TeamPlannerConfig,
+    TeamPlannerState, TeamStep,
 };
 use proptest::prelude::*;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -17,6 +17,7 @@ fn config(method: Method, executor: Executor) -> TeamPlannerConfig {
         method,
         executor,
         window: None,
+        may_fall_back: false,
         may_follow: true,
         action_steps: 1,
         seed: Seed(1),
@@ -206,4 +207,47 @@ fn a_search_that_spends_its_budget_is_counted_and_priority_inheritance_leads() {
     }
     assert!(team.is_done());
     assert!(team.state.counts.failures > 0, "{:?}", team.state.counts);
+}
+
+/// Two agents of one box in a lane of eight boxes, one behind the other, both to the east.
+fn lane() -> Problem {
+    let free = crate::FreeSpace::new(8, 1, |_, _| true);
+    let agent =
+        |col, goal| crate::Agent { size: 1, start: GridPose::new(col, 0, 0), goal: (goal, 0) };
+    Problem { free, model: crate::ActionModel::Turns, agents: vec![agent(1, 6), agent(0, 5)] }
+}
+
+#[test]
+fn a_plan_that_a_caller_orders_is_carried_out_and_then_all_wait_for_the_next() {
+    for executor in [Executor::Adg, Executor::Blind] {
+        let mut team = Team::new(&lane(), config(Method::Ordered, executor));
+        team.step(|_| false);
+        assert_eq!(team.poses[0].col, 1, "without a plan all wait");
+        team.state.ordered = Some(vec![vec![Action::Forward; 3], vec![Action::Forward; 2]]);
+        team.step(|_| false);
+        let left = team.planner.actions_left(&team.state, &team.poses);
+        assert_eq!(left, if executor == Executor::Adg { [2, 1] } else { [2, 2] }, "{executor:?}");
+        for _ in 0..5 {
+            team.step(|_| false);
+        }
+        assert_eq!([team.poses[0].col, team.poses[1].col], [4, 2], "{executor:?}");
+        assert_eq!(team.planner.actions_left(&team.state, &team.poses), [0, 0]);
+        assert_eq!((team.state.counts.plans, team.state.counts.failures), (1, 0));
+    }
+}
+
+#[test]
+fn an_ordered_plan_that_collides_or_leaves_the_map_is_a_failure_and_all_wait() {
+    for wrong in [
+        vec![vec![Action::Wait], vec![Action::Forward]],
+        vec![vec![Action::Forward; 9], vec![]],
+        vec![vec![Action::TurnLeft, Action::TurnLeft, Action::Forward, Action::Forward], vec![]],
+        vec![vec![Action::Forward]],
+    ] {
+        let mut team = Team::new(&lane(), config(Method::Ordered, Executor::Adg));
+        team.state.ordered = Some(wrong.clone());
+        team.step(|_| false);
+        assert_eq!([team.poses[0].col, team.poses[1].col], [1, 0], "{wrong:?}");
+        assert_eq!((team.state.counts.plans, team.state.counts.failures), (1, 1), "{wrong:?}");
+    }
 }

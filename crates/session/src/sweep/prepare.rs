@@ -40,6 +40,7 @@ pub(super) fn prepare<T: Send>(
         let (source, compiled) = base.compile(variant)?;
         Ok(CompiledVariant {
             seeds: compiled.seed_effect(),
+            privilege: compiled.privilege(),
             agents: compiled.body_count() as u64,
             made: make(k, &source, compiled.as_ref())?,
         })
@@ -48,6 +49,7 @@ pub(super) fn prepare<T: Send>(
     let mut made = Vec::with_capacity(all.len());
     for (variant, one) in variants.iter_mut().zip(all) {
         variant.seeds = one.seeds;
+        variant.privilege = one.privilege.map(String::from);
         made.push(one.made);
     }
     let config = first.plan();
@@ -122,6 +124,7 @@ impl<'a> BaseSource<'a> {
 /// The findings of compiling a variant, and the thing made of it.
 struct CompiledVariant<T> {
     seeds: SeedEffect,
+    privilege: Option<&'static str>,
     agents: u64,
     made: T,
 }

@@ -8,8 +8,8 @@ use super::state::RobotsState;
 use super::team::{TaskMemory, Team, TeamState};
 use super::world::RobotsWorld;
 use sidestep_kernel::EntityId;
+use sidestep_planners::Courier;
 use sidestep_planners::tasks::{TaskOfAgent, TaskState};
-use sidestep_planners::{Courier, GridPose};
 
 /// Words of a robot's task in a snapshot, after their number. Those of the first robot of a team are followed by the team's
 /// own.
@@ -29,15 +29,14 @@ impl RobotsWorld {
         state: &RobotsState,
         team: &Team,
         team_state: &TeamState,
-        poses: &[GridPose],
+        couriers: &[Courier],
     ) -> Option<Vec<Option<(u32, u32)>>> {
         let mut guard = team_state.tasks()?;
         let TaskMemory { dispatcher, state: tasks } = &mut *guard;
-        let couriers = couriers(state, team, poses);
         let before: Vec<Option<u64>> =
             tasks.agents.iter().map(|own| own.map(|own| own.task)).collect();
         let mut dispatcher = dispatcher.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let finished = dispatcher.advance(tasks, &couriers);
+        let finished = dispatcher.advance(tasks, couriers);
         for (robot, id) in team.robots.clone().enumerate() {
             let task = tasks.agents[robot].map(|own| own.task);
             let memory = &state.body(id).memory;
@@ -48,28 +47,20 @@ impl RobotsWorld {
                 Errands::mark_start(memory);
             }
         }
-        Some((0..poses.len()).map(|robot| dispatcher.goal(tasks, robot)).collect())
+        Some((0..couriers.len()).map(|robot| dispatcher.goal(tasks, robot)).collect())
     }
 
     /// Returns the goals that [`Self::errands`] will return in the next cycle, and gives no task yet.
     pub(crate) fn errands_ahead(
         &self,
-        state: &RobotsState,
-        team: &Team,
         team_state: &TeamState,
-        poses: &[GridPose],
+        couriers: &[Courier],
     ) -> Option<Vec<Option<(u32, u32)>>> {
         let TaskMemory { dispatcher, state: mut tasks } = team_state.tasks()?.clone();
         let mut dispatcher = dispatcher.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        dispatcher.advance(&mut tasks, &couriers(state, team, poses));
-        Some((0..poses.len()).map(|robot| dispatcher.goal(&tasks, robot)).collect())
+        dispatcher.advance(&mut tasks, couriers);
+        Some((0..couriers.len()).map(|robot| dispatcher.goal(&tasks, robot)).collect())
     }
-}
-
-/// Returns the robots of a team as those who carry tasks out.
-fn couriers(state: &RobotsState, team: &Team, poses: &[GridPose]) -> Vec<Courier> {
-    let of_robot = |(id, &pose)| Courier { pose, is_in_action: state.action_progress.left(id) > 0 };
-    team.robots.clone().zip(poses).map(of_robot).collect()
 }
 
 impl RobotsState {

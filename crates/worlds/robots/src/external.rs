@@ -4,12 +4,15 @@
 use super::Scratch;
 use super::cycle_context::{CycleContext, with_cycle};
 use super::decide::{ActionId, Avoidance, External};
-use super::effector::{HEADING_NAMES, Side};
+use super::effector::{HEADING_NAMES, STANDARD_ACTIONS, Side};
+use super::plan::{action_of_order, place_in_team};
 use super::state::RobotsState;
+use super::team::TeamOrders;
 use super::world::{BodyType, RobotModel, RobotsWorld, Role};
 use sidestep_kernel::control::{AgentTeam, AgentTeams, BufferMut, Order, ValueDomain, ValueSpace};
 use sidestep_kernel::space::OccupantWord;
 use sidestep_kernel::{Cycle, EntityId, Phases, World};
+use sidestep_planners::GridPose;
 use std::sync::Arc;
 
 #[cfg(test)]
@@ -18,6 +21,9 @@ mod tests;
 /// Most words of others that one robot observes: those of the first senders by id. An observation has one shape
 /// for a whole run, which would else grow with the number of robots.
 const MAX_HEARD: usize = 64;
+
+/// The order of a plan.
+const PLAN: &str = "plan";
 
 /// Robots that make up a team.
 struct AlikeRobots<'a> {
@@ -32,7 +38,7 @@ impl AlikeRobots<'_> {
         self.ty.kind == ty.kind
             && Arc::ptr_eq(&self.model.body, &model.body)
             && self.model.is_external == model.is_external
-            && self.model.is_ordered == model.is_ordered
+            && self.model.team_orders == model.team_orders
     }
 }
 
@@ -94,8 +100,8 @@ impl RobotsWorld {
             );
         }
         spaces.extend(self.common_observation_spaces());
-        if model.is_ordered {
-            spaces.extend(self.planner_observation_spaces());
+        if let Some(orders) = model.team_orders {
+            spaces.extend(self.planner_observation_spaces(orders));
         }
         spaces
     }
@@ -129,16 +135,22 @@ impl RobotsWorld {
     }
 
     /// Returns the spaces of what a planner knows beyond what the robot itself perceives.
-    fn planner_observation_spaces(&self) -> [ValueSpace; 2] {
+    fn planner_observation_spaces(&self, orders: TeamOrders) -> Vec<ValueSpace> {
         let longest_side = self.map.width().max(self.map.height());
         let boxes = ValueDomain::Integer { low: -1, high: i64::from(longest_side) - 1 };
         let cycles = ValueDomain::Integer { low: 0, high: i64::from(u32::MAX) };
         let goal = "column and row where it has to go next; -1 for one with no goal";
         let busy = "cycles of delay, and of an action that goes on, before it can act";
-        [
+        let mut spaces = vec![
             ValueSpace::new("goal_boxes", boxes, goal).with_shape([2]),
             ValueSpace::new("busy_cycles", cycles, busy),
-        ]
+        ];
+        if let TeamOrders::Plans { actions } = orders {
+            let left = ValueDomain::Integer { low: 0, high: i64::from(actions) };
+            let meaning = "actions of its plan that it has yet to do; 0 for all where a plan is over or given up";
+            spaces.push(ValueSpace::new("plan_left", left, meaning));
+        }
+        spaces
     }
 
     fn max_heard(&self) -> usize {
@@ -148,8 +160,22 @@ impl RobotsWorld {
     /// Returns the spaces of a robot's orders.
     fn action_spaces(&self, model: &RobotModel) -> Vec<ValueSpace> {
         let actions = ValueDomain::Discrete(model.body.effector.actions.clone());
-        if model.is_ordered {
-            return vec![ValueSpace::new(External::ACTION, actions, "the action that it tries")];
+        match model.team_orders {
+            Some(TeamOrders::Actions) => {
+                return vec![ValueSpace::new(
+                    External::ACTION,
+                    actions,
+                    "the action that it tries",
+                )];
+            }
+            Some(TeamOrders::Plans { actions: length }) => {
+                let standard = choice(STANDARD_ACTIONS);
+                let meaning = "its actions in the plan of its team, from the next cycle on";
+                return vec![
+                    ValueSpace::new(PLAN, standard, meaning).with_shape([length as usize]),
+                ];
+            }
+            None => {}
         }
         let trip = choice(["none", "begun", "done"]);
         let mut spaces = vec![
@@ -166,12 +192,20 @@ impl RobotsWorld {
 
     /// Records an order in the memory of its robot.
     pub(super) fn record_order(&self, state: &RobotsState, order: &Order<'_>) {
-        let [value] = *order.values else { return };
-        let space = &self.teams.as_slice()[order.team].action_spaces[order.space];
         let memory = &state.body(order.agent).memory;
-        match &self.type_of(order.agent).role {
-            Role::Robot(model) if model.is_ordered => Avoidance::order(memory, value as ActionId),
-            _ => External::record_order(memory, &space.name, value as u64),
+        let Role::Robot(model) = &self.type_of(order.agent).role else { return };
+        match (model.team_orders, order.values) {
+            (Some(TeamOrders::Plans { .. }), values) => {
+                let Some((team, robot)) = place_in_team(self, order.agent) else { return };
+                let actions = values.iter().map(|&value| action_of_order(value as u8)).collect();
+                state.planner_teams[team].order_plan(robot, actions);
+            }
+            (Some(TeamOrders::Actions), &[value]) => Avoidance::order(memory, value as ActionId),
+            (None, &[value]) => {
+                let space = &self.teams.as_slice()[order.team].action_spaces[order.space];
+                External::record_order(memory, &space.name, value as u64);
+            }
+            _ => {}
         }
     }
 
@@ -190,34 +224,62 @@ impl RobotsWorld {
                 cycle.observe(id, row, scratch, buffers);
             }
         });
-        self.observe_goals(state, team, buffers);
+        self.observe_goals(state, now, team, buffers);
     }
 
-    /// Writes what a planner knows of a team that it leads from outside, into the last buffers.
-    fn observe_goals(&self, state: &RobotsState, team: usize, buffers: &mut [BufferMut<'_>]) {
+    /// Writes what a planner knows of a team that it leads from outside: goals and who is busy into the last buffers, and
+    /// where robots report, what it believes over their own places and headings.
+    fn observe_goals(
+        &self,
+        state: &RobotsState,
+        now: Cycle,
+        team: usize,
+        buffers: &mut [BufferMut<'_>],
+    ) {
         let agents = &self.teams.as_slice()[team].agents;
         let first = agents.first().map(|&id| &self.type_of(id).role);
         let Some(Role::Robot(model)) = first.filter(|_| !buffers.is_empty()) else { return };
-        let Some((_, [places, busy])) = buffers.split_last_chunk_mut::<2>() else { return };
-        if !model.is_ordered {
-            return;
-        }
+        let Some(orders) = model.team_orders else { return };
+        let (_, others) = buffers.split_at_mut(2 * model.body.sensors.len());
+        let count = self.planner_observation_spaces(orders).len();
+        let Some(split) = others.len().checked_sub(count) else { return };
+        let (percepts, of_planner) = others.split_at_mut(split);
+        let [goals, busy, plan_left @ ..] = of_planner else { return };
         let teams = self.planner_teams.iter().zip(&state.planner_teams);
         // Robots of one section are all in one team, but a team may have several sections.
         let shown = teams.filter(|(team, _)| agents.binary_search(&team.robots.start).is_ok());
         for (team, team_state) in shown {
-            let goals = self.goals_ahead(state, team, team_state);
-            for (id, goal) in team.robots.clone().zip(goals) {
+            let known = self.situation_ahead(state, team, team_state, now);
+            let mut busy_cycles = vec![0; known.poses.len()];
+            for one in &known.busy {
+                busy_cycles[one.agent as usize] = one.delay_steps + one.steps_left;
+            }
+            for (robot, id) in team.robots.clone().enumerate() {
                 let Ok(row) = agents.binary_search(&id) else { continue };
-                let [col, map_row] =
-                    goal.map_or([-1; 2], |(col, row)| [i64::from(col), i64::from(row)]);
-                places.set_integer(2 * row, col);
-                places.set_integer(2 * row + 1, map_row);
-                let cycles = state.delays.remaining(id) + state.action_progress.left(id);
-                busy.set_integer(row, i64::from(cycles));
+                let goal = known.goals[robot];
+                set_boxes(
+                    goals,
+                    row,
+                    goal.map_or([-1; 2], |(col, row)| [i64::from(col), i64::from(row)]),
+                );
+                busy.set_integer(row, i64::from(busy_cycles[robot]));
+                for left in plan_left.iter_mut() {
+                    left.set_integer(row, known.actions_left[robot] as i64);
+                }
+                if team.leader.reports.is_some() {
+                    let GridPose { col, row: map_row, heading } = known.poses[robot];
+                    set_boxes(&mut percepts[2], row, [col, map_row].map(i64::from));
+                    percepts[3].set_integer(row, i64::from(heading));
+                }
             }
         }
     }
+}
+
+/// Writes a column and a row of the map into a row of a buffer.
+fn set_boxes(buffer: &mut BufferMut<'_>, row: usize, [col, map_row]: [i64; 2]) {
+    buffer.set_integer(2 * row, col);
+    buffer.set_integer(2 * row + 1, map_row);
 }
 
 impl<T: OccupantWord> CycleContext<'_, T> {
@@ -249,8 +311,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
         // 0 is no contact.
         others[0].set_integer(row, contact.map_or(0, |contact| i64::from(contact.kind) + 1));
         others[1].set_integer(row, contact.map_or(0, |contact| contact.side as i64 + 1));
-        others[2].set_integer(2 * row, i64::from(col));
-        others[2].set_integer(2 * row + 1, i64::from(map_row));
+        set_boxes(&mut others[2], row, [col, map_row].map(i64::from));
         others[3].set_integer(row, i64::from(body.facing.get().heading()));
         others[4].set_integer(row, i64::from(is_due));
         if let Some(radio) = &self.world.radio {

@@ -2,6 +2,7 @@
 //! of the state, up to and with this body's action.
 
 mod outcome;
+mod plan;
 mod senses;
 #[cfg(test)]
 mod tests;
@@ -42,7 +43,7 @@ impl RobotsWorld {
         let kind = &self.kinds[usize::from(self.type_of(id).kind)];
         let inspection = Inspection::new(body, now, format!("{kind} {id}"));
         with_cycle!(self, &copy, now, |cycle| {
-            let inspector = Inspector { cycle, slot, id, inspection };
+            let inspector = Inspector { cycle, present: state, slot, id, inspection };
             Some(inspector.inspect())
         })
     }
@@ -55,6 +56,8 @@ impl RobotsWorld {
 /// An inspection of one body in the making, on a copy of the state.
 struct Inspector<'a, T: OccupantWord> {
     cycle: &'a CycleContext<'a, T>,
+    /// The state that the copy is of: it alone has the progress of robots.
+    present: &'a RobotsState,
     slot: EntitySlot,
     id: EntityId,
     inspection: Inspection,
@@ -66,6 +69,7 @@ impl<'a, T: OccupantWord> Inspector<'a, T> {
         // Robots decided from outside perceive within a cycle only where readings are recorded.
         scratch.keep_readings = true;
         self.add_present();
+        self.add_plan();
         self.add_percept(scratch);
         let bodies = 0..self.cycle.world.bodies.len() as EntitySlot;
         bodies.clone().for_each(|slot| self.cycle.perceive(slot, scratch));

@@ -48,6 +48,7 @@ pub mod progress;
 mod purpose;
 mod ranges;
 mod remarks;
+mod reports;
 pub mod rows;
 pub mod scenario;
 mod simultaneous;

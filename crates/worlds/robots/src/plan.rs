@@ -1,28 +1,46 @@
 //! *Plan*: teams with common knowledge, whose planner chooses the next action of each robot before anybody claims.
 //!
-//! The planner is a part of the environment, and privileged: it knows where all bodies truly stand, and which robots
-//! are delayed. It writes each action into the robot's memory, from where the robot's behavior takes it.
+//! The planner is a part of the environment, and privileged, unless its robots report: it knows where all bodies truly
+//! stand, and which robots are delayed. It writes each action into the robot's memory, from where the robot's behavior
+//! takes it.
 
 use super::effector::{FORWARD, LEFT, RIGHT, STAY};
 use super::perceive::memory_of;
 use super::state::BodyRecord;
 use super::state::RobotsState;
-use super::team::{Team, TeamState};
+use super::team::{Team, TeamOrders, TeamState};
 use super::team_memory::TeamMemory;
 use super::world::{RobotsWorld, Role};
 use super::{decide, purpose};
 use sidestep_kernel::{Cycle, EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
-use sidestep_planners::{Action, BusyAgent, GridPose, PlanCounts, TeamStep};
+use sidestep_planners::{Action, BusyAgent, Courier, GridPose, PlanCounts, TeamStep};
 use std::collections::BTreeSet;
 
-/// What a team looks like at the start of a cycle.
+/// What a team looks like at the start of a cycle, as it is or as its planner believes.
 #[derive(Debug, Default)]
-struct TeamSituation {
-    poses: Vec<GridPose>,
-    goals: Vec<Option<(u32, u32)>>,
-    others: Vec<(u32, u32)>,
-    busy: Vec<BusyAgent>,
+pub(crate) struct TeamSituation {
+    pub(crate) poses: Vec<GridPose>,
+    pub(crate) goals: Vec<Option<(u32, u32)>>,
+    pub(crate) others: Vec<(u32, u32)>,
+    pub(crate) busy: Vec<BusyAgent>,
+    /// Whether each pose is known to be true.
+    pub(crate) is_known: Vec<bool>,
+    /// Actions left of the plan of each robot of a team whose plans a caller orders.
+    pub(crate) actions_left: Vec<usize>,
+}
+
+impl TeamSituation {
+    /// Returns the robots as those who carry tasks out. Whether one has come to a place is known by its reports only.
+    fn couriers(&self) -> Vec<Courier> {
+        let robots = self.poses.iter().zip(&self.is_known);
+        let mut couriers: Vec<Courier> =
+            robots.map(|(&pose, is_known)| Courier { pose, is_in_action: !is_known }).collect();
+        for busy in self.busy.iter().filter(|busy| busy.steps_left > 0) {
+            couriers[busy.agent as usize].is_in_action = true;
+        }
+        couriers
+    }
 }
 
 impl RobotsWorld {
@@ -47,34 +65,41 @@ impl RobotsWorld {
         self.start_team_delays(state, now);
         for (team, team_state) in self.planner_teams.iter().zip(&state.planner_teams) {
             if self.bodies[team.robots.start as usize].is_due(now) {
-                self.plan_team(state, team, team_state);
+                self.plan_team(state, team, team_state, now);
             }
         }
     }
 
-    fn plan_team(&self, state: &RobotsState, team: &Team, team_state: &TeamState) {
+    fn plan_team(&self, state: &RobotsState, team: &Team, team_state: &TeamState, now: Cycle) {
         let (mut planner, mut guard) = team_state.locked();
         let memory = &mut *guard;
-        let mut situation = self.situation(state, team);
-        let errands = self.errands(state, team, team_state, &situation.poses);
-        situation.goals =
-            errands.unwrap_or_else(|| self.choose_goals(state, team, &memory.planner.pibt.goals));
-        memory.compare(&situation.poses);
-        let TeamSituation { poses, goals, others, busy } = &situation;
-        let now = TeamStep { poses, goals, others, busy };
-        if team.leader.is_external {
+        let truth = self.situation(state, team);
+        memory.compare(&truth.poses);
+        let mut situation = self.known_situation(team, memory, truth, now);
+        let errands = self.errands(state, team, team_state, &situation.couriers());
+        let last = &memory.planner.pibt.goals;
+        let choose = || self.choose_goals(state, team, &situation.is_known, last);
+        situation.goals = errands.unwrap_or_else(choose);
+        let TeamSituation { poses, goals, others, busy, .. } = &situation;
+        if team.leader.orders == Some(TeamOrders::Actions) {
             memory.planner.take_orders(goals);
-            self.note_orders(state, team, memory, poses);
+            self.note_orders(state, team, memory, &situation);
             return;
         }
+        let now = TeamStep { poses, goals, others, busy };
         let actions = planner.step(&mut memory.planner, now);
         let actions = actions.expect("goals are boxes where the body fits");
         for (robot, (id, &action)) in team.robots.clone().zip(actions).enumerate() {
-            let waits = action == Action::Forward && self.is_kept_out(state, id);
+            let waits = action == Action::Forward && self.must_wait(state, team, id);
             let action = if waits { Action::Wait } else { action };
             memory.planned[robot] = poses[robot].after(action);
             decide::Avoidance::order(&state.body(id).memory, action_id(action));
         }
+    }
+
+    /// Returns whether a planner that sees all lets a robot wait before a box that is still held.
+    fn must_wait(&self, state: &RobotsState, team: &Team, id: EntityId) -> bool {
+        team.leader.reports.is_none() && self.is_kept_out(state, id)
     }
 
     /// Notes where the actions lead that a caller has ordered for a team.
@@ -83,41 +108,51 @@ impl RobotsWorld {
         state: &RobotsState,
         team: &Team,
         memory: &mut TeamMemory,
-        poses: &[GridPose],
+        situation: &TeamSituation,
     ) {
-        for (robot, id) in team.robots.clone().enumerate() {
+        let TeamSituation { poses, busy, .. } = situation;
+        for (robot, id) in (0..).zip(team.robots.clone()) {
+            let pose = poses[robot as usize];
             // Its order stands until it can act.
-            if state.delays.remaining(id) > 0 || state.action_progress.left(id) > 0 {
-                memory.planned[robot] = Some(poses[robot]);
+            if busy.binary_search_by_key(&robot, |busy| busy.agent).is_ok() {
+                memory.planned[robot as usize] = Some(pose);
                 continue;
             }
             let order = &state.body(id).memory;
-            // As those that a planner leads, it waits before a box that is still held.
-            if self.is_kept_out(state, id) && decide::Avoidance::ordered(order) == FORWARD {
+            // As those that a planner leads.
+            if decide::Avoidance::ordered(order) == FORWARD && self.must_wait(state, team, id) {
                 decide::Avoidance::order(order, STAY);
             }
             let action = planned_action(decide::Avoidance::ordered(order));
-            memory.planned[robot] = action.and_then(|action| poses[robot].after(action));
+            memory.planned[robot as usize] = action.and_then(|action| pose.after(action));
         }
     }
 
-    /// Returns the goals that the robots of a team have in the next cycle, if they are not delayed anew before it.
-    pub(crate) fn goals_ahead(
+    /// Returns what the planner of a team will know in cycle `now`, the next one, if no robot is delayed anew before it.
+    pub(crate) fn situation_ahead(
         &self,
         state: &RobotsState,
         team: &Team,
         team_state: &TeamState,
-    ) -> Vec<Option<(u32, u32)>> {
-        let (_planner, memory) = team_state.locked();
-        let situation = self.situation(state, team);
-        let errands = self.errands_ahead(state, team, team_state, &situation.poses);
-        errands.unwrap_or_else(|| self.choose_goals(state, team, &memory.planner.pibt.goals))
+        now: Cycle,
+    ) -> TeamSituation {
+        let (planner, memory) = team_state.locked();
+        let mut memory = memory.clone();
+        let mut situation =
+            self.known_situation(team, &mut memory, self.situation(state, team), now);
+        situation.actions_left = planner.actions_left(&memory.planner, &situation.poses);
+        let errands = self.errands_ahead(team_state, &situation.couriers());
+        let last = &memory.planner.pibt.goals;
+        let choose = || self.choose_goals(state, team, &situation.is_known, last);
+        situation.goals = errands.unwrap_or_else(choose);
+        situation
     }
 
     /// Returns the poses of a team, which of it are delayed or in an action, and the boxes of all other bodies. Those that a
     /// body of the team leaves are none of them: they will be free, and are waited for.
     fn situation(&self, state: &RobotsState, team: &Team) -> TeamSituation {
-        let mut situation = TeamSituation::default();
+        let mut situation =
+            TeamSituation { is_known: vec![true; team.robots.len()], ..Default::default() };
         for (slot, body) in state.bodies.iter().enumerate() {
             let is_open = state.is_open_door(self, slot as u32);
             if !team.robots.contains(&body.id) && !is_open {
@@ -144,11 +179,13 @@ impl RobotsWorld {
     }
 
     /// Returns the goal of each robot: the one that it had as long as it is a goal of its present trip, else the nearest
-    /// box where its body fits and does not meet the goal of another one; where there is none, just the nearest.
+    /// box where its body fits and does not meet the goal of another one; where there is none, just the nearest. Of a robot
+    /// that has not reported it is known only which one it had.
     fn choose_goals(
         &self,
         state: &RobotsState,
         team: &Team,
+        is_known: &[bool],
         last: &[Option<(u32, u32)>],
     ) -> Vec<Option<(u32, u32)>> {
         let mut taken = BTreeSet::new();
@@ -156,7 +193,7 @@ impl RobotsWorld {
         let mut undecided = Vec::new();
         for (robot, id) in team.robots.clone().enumerate() {
             let anchors = self.anchors(state, id);
-            match last[robot].filter(|goal| anchors.contains(goal)) {
+            match last[robot].filter(|goal| !is_known[robot] || anchors.contains(goal)) {
                 Some(goal) => {
                     goals[robot] = Some(goal);
                     taken.insert(goal);
@@ -237,6 +274,11 @@ fn meets(taken: &BTreeSet<(u32, u32)>, (col, row): (u32, u32), size: u32) -> boo
     let rows = row.saturating_sub(reach)..=row + reach;
     let cols = col.saturating_sub(reach)..=col + reach;
     taken.iter().any(|(other_col, other_row)| cols.contains(other_col) && rows.contains(other_row))
+}
+
+/// Returns an action by its number among those that robots have for planners, in the order of these numbers.
+pub(crate) fn action_of_order(number: u8) -> Action {
+    planned_action(number).unwrap_or(Action::Wait)
 }
 
 fn action_id(action: Action) -> decide::ActionId {

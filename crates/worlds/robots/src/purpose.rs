@@ -29,6 +29,8 @@ pub(crate) const RIGHT_OF_WAY: Purpose = Purpose(10);
 pub(crate) const PLAN: Purpose = Purpose(11);
 /// Delays of a section of robots that are drawn together; the entity is its first robot.
 pub(crate) const TEAM_DELAYS: Purpose = Purpose(12);
+/// Lost reports to a planner.
+pub(crate) const REPORT: Purpose = Purpose(13);
 /// Readings of the sensor with this number on its robot: from 16 on, so that there is room for
 /// further purposes below.
 pub(crate) const fn sense(sensor: usize) -> Purpose {

@@ -354,6 +354,24 @@ pub(super) struct PlannerSection {
     pub(super) budget_expansions: Option<Spanned<Budget>>,
     /// The plan of `file`.
     pub(super) file: Option<Spanned<PathBuf>>,
+    /// The places of its robots that the planner knows.
+    #[serde(default)]
+    pub(super) places: KnownPlaces,
+    /// Actions from one report of a robot to the next one.
+    pub(super) report_every: Option<Spanned<Steps>>,
+    /// The chance that a report is lost.
+    pub(super) report_loss: Option<Spanned<Fraction>>,
+}
+
+/// The places of its robots that a planner knows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum KnownPlaces {
+    /// Those where they truly are: the planner is privileged.
+    #[default]
+    True,
+    /// Those that they report; in between, those where its orders should have led them.
+    Believed,
 }
 
 /// An algorithm of multi-agent path finding.

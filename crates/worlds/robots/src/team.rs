@@ -1,13 +1,14 @@
 //! The teams that planners lead: their robots, and what a planner remembers of them.
 
+use crate::reports::{Belief, Reports};
 use crate::team_memory::TeamMemory;
 use crate::team_words;
 use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
 use sidestep_planners::tasks::TaskState;
 use sidestep_planners::{
-    Dispatcher, GridPose, Method, PlanCounts, TeamPlanner, TeamPlannerConfig, TeamPlannerState,
-    TeamTasks,
+    Action, Dispatcher, GridPose, Method, PlanCounts, TeamPlanner, TeamPlannerConfig,
+    TeamPlannerState, TeamTasks,
 };
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -28,8 +29,22 @@ pub(crate) struct Team {
 pub(crate) struct TeamLeader {
     /// The planner. The seed is another one in each run.
     pub(crate) config: TeamPlannerConfig,
-    /// Whether a caller orders the actions of all robots, instead of the planner.
-    pub(crate) is_external: bool,
+    /// What a caller orders all robots to do, instead of the planner.
+    pub(crate) orders: Option<TeamOrders>,
+    /// How robots report where they are; without it, the planner knows all that is true.
+    pub(crate) reports: Option<Reports>,
+}
+
+/// What a caller orders the robots of a team to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TeamOrders {
+    /// The next action.
+    Actions,
+    /// A plan of up to so many actions, which the executor carries out.
+    Plans {
+        /// The actions of an order; a shorter plan waits at its end.
+        actions: u32,
+    },
 }
 
 /// The planner of a team: what changes, and a cache.
@@ -65,10 +80,13 @@ impl TeamState {
         let is_stepwise = config.method == Method::Pibt;
         let planner = TeamPlanner::new(free, sizes, config).expect("a body has at least one box");
         let robots = sizes.len();
+        let has_reports = team.leader.reports.is_some();
         let memory = TeamMemory {
             planner: TeamPlannerState::new(robots),
             planned: vec![None; robots],
             off_plan: vec![0; robots],
+            beliefs: vec![Belief::default(); if has_reports { robots } else { 0 }],
+            has_reported: vec![false; robots],
         };
         let planner = Arc::new(Mutex::new(planner));
         Self { planner, is_stepwise, memory: Mutex::new(memory), tasks: None }
@@ -92,6 +110,20 @@ impl TeamState {
     /// Returns the tasks of a team that has some.
     pub(crate) fn tasks(&self) -> Option<MutexGuard<'_, TaskMemory>> {
         self.tasks.as_ref().map(lock)
+    }
+
+    /// Returns the place where a robot with a task has to go next.
+    pub(crate) fn goal_of_task(&self, robot: usize) -> Option<(u32, u32)> {
+        let memory = self.tasks()?;
+        lock(&memory.dispatcher).goal(&memory.state, robot)
+    }
+
+    /// Records the actions of a plan that a caller orders for a robot; the others wait, unless they are ordered, too.
+    pub(crate) fn order_plan(&self, robot: usize, actions: Vec<Action>) {
+        let mut memory = lock(&self.memory);
+        let robots = memory.off_plan.len();
+        let plan = memory.planner.ordered.get_or_insert_with(|| vec![Vec::new(); robots]);
+        plan[robot] = actions;
     }
 
     /// Returns the planner and what it remembers, for planning a step.

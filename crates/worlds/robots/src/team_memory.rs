@@ -1,5 +1,6 @@
 //! What the planner of a team remembers from cycle to cycle.
 
+use crate::reports::Belief;
 use sidestep_planners::{GridPose, TeamPlannerState};
 
 /// All that the planner of a team remembers.
@@ -10,6 +11,10 @@ pub(crate) struct TeamMemory {
     pub(crate) planned: Vec<Option<GridPose>>,
     /// Times that each robot was elsewhere than planned.
     pub(crate) off_plan: Vec<u32>,
+    /// What is believed of each robot; empty for a planner that knows all that is true.
+    pub(crate) beliefs: Vec<Belief>,
+    /// Whether each robot has reported in the present cycle; no state, because it is set anew in each one.
+    pub(crate) has_reported: Vec<bool>,
 }
 
 impl TeamMemory {

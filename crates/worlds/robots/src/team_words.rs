@@ -3,10 +3,13 @@
 //! | words | of |
 //! |---|---|
 //! | steps without the goal, goal, planned place and heading, times off the plan | each robot |
+//! | believed place, heading, place that it leaves, cycles of its action and its delay | each robot where these report |
+//! | actions of an order and 1, or 0 without; the actions by 16 | each robot of a team that carries plans out |
 //! | the first step of the next search, counts of plans | robot 0 of a team that carries plans out |
 //! | steps of the plan so far, steps without progress | robot 0 where there is a plan |
 //! | actions done, place and heading at its start, number of actions, the actions by 16 | each robot where there is a plan |
 
+use crate::reports::Belief;
 use crate::team_memory::TeamMemory;
 use sidestep_planners::{Action, Execution, GridPose, Plan, PlanCounts};
 
@@ -27,6 +30,11 @@ pub(crate) fn words(memory: &TeamMemory, robot: usize, is_stepwise: bool) -> Vec
         heading,
         memory.off_plan[robot],
     ];
+    if let Some(belief) = memory.beliefs.get(robot) {
+        let Belief { pose, from, steps_left, delay_steps } = *belief;
+        let places = [packed(Some(pose.position())), u32::from(pose.heading), packed(Some(from))];
+        words.extend(places.into_iter().chain([steps_left, delay_steps]));
+    }
     if is_stepwise {
         return words;
     }
@@ -36,6 +44,13 @@ pub(crate) fn words(memory: &TeamMemory, robot: usize, is_stepwise: bool) -> Vec
             words.extend([number as u32, (number >> 32) as u32]);
         }
     }
+    // An order that the next cycle begins with is there between cycles only.
+    if let Some(ordered) = &planner.ordered {
+        words.push(1 + ordered[robot].len() as u32);
+        words.extend(packed_actions(&ordered[robot]));
+    } else {
+        words.push(0);
+    }
     let Some(execution) = &planner.execution else { return words };
     if robot == 0 {
         words.extend([execution.step, execution.stall_steps]);
@@ -43,7 +58,9 @@ pub(crate) fn words(memory: &TeamMemory, robot: usize, is_stepwise: bool) -> Vec
     let path = execution.plan.path(robot);
     let start = packed(Some(path[0].position()));
     words.extend([execution.progress[robot], start, u32::from(path[0].heading)]);
-    words.extend(packed_actions(path));
+    let actions = actions_of(path);
+    words.push(actions.len() as u32);
+    words.extend(packed_actions(&actions));
     words
 }
 
@@ -57,13 +74,32 @@ pub(crate) fn restore(memory: &mut TeamMemory, shares: &[&[u32]], is_stepwise: b
         memory.planned[robot] =
             unpacked(place).map(|(col, row)| GridPose::new(col, row, heading as u8));
         memory.off_plan[robot] = off_plan;
+        if let Some(belief) = memory.beliefs.get_mut(robot) {
+            let [place, heading, from, steps_left, delay_steps] =
+                [(); 5].map(|()| reader.next().unwrap_or(0));
+            let (col, row) = unpacked(place).unwrap_or_default();
+            let pose = GridPose::new(col, row, heading as u8);
+            let from = unpacked(from).unwrap_or_default();
+            *belief = Belief { pose, from, steps_left, delay_steps };
+        }
     }
     let Some(first) = readers.first_mut().filter(|_| !is_stepwise) else { return };
     let [next_search, plans, failures, expansions, costs, bounds] =
         [(); 6].map(|()| first.next_number().unwrap_or(0));
     memory.planner.next_search = next_search;
     memory.planner.counts = PlanCounts { plans, failures, expansions, costs, bounds };
+    memory.planner.ordered = ordered(&mut readers);
     memory.planner.execution = execution(&mut readers);
+}
+
+/// Reads the actions of each robot that a caller has ordered; none where there are none.
+fn ordered(readers: &mut [Reader<'_>]) -> Option<Vec<Vec<Action>>> {
+    let mut plan = Vec::with_capacity(readers.len());
+    for reader in readers {
+        let count = reader.next().and_then(|word| word.checked_sub(1));
+        plan.push(count.and_then(|count| reader.actions(count as usize)));
+    }
+    plan.into_iter().collect()
 }
 
 fn execution(readers: &mut [Reader<'_>]) -> Option<Execution> {
@@ -98,36 +134,52 @@ impl Reader<'_> {
         Some(u64::from(high) << 32 | u64::from(low))
     }
 
-    fn path(&mut self) -> Option<Vec<GridPose>> {
-        let (col, row) = unpacked(self.next()?)?;
-        let mut pose = GridPose::new(col, row, self.next()? as u8);
-        let actions = self.next()? as usize;
-        let mut path = vec![pose];
+    fn actions(&mut self, count: usize) -> Option<Vec<Action>> {
+        let mut actions = Vec::new();
         let mut word = 0;
-        for index in 0..actions {
+        for index in 0..count {
             if index.is_multiple_of(ACTIONS_PER_WORD) {
                 word = self.next()?;
             }
-            pose = pose.after(ACTIONS[(word & 3) as usize])?;
+            actions.push(ACTIONS[(word & 3) as usize]);
             word >>= 2;
+        }
+        Some(actions)
+    }
+
+    fn path(&mut self) -> Option<Vec<GridPose>> {
+        let (col, row) = unpacked(self.next()?)?;
+        let mut pose = GridPose::new(col, row, self.next()? as u8);
+        let count = self.next()? as usize;
+        let mut path = vec![pose];
+        for action in self.actions(count)? {
+            pose = pose.after(action)?;
             path.push(pose);
         }
         Some(path)
     }
 }
 
-/// Returns the number of actions of a path, and the actions.
-fn packed_actions(path: &[GridPose]) -> Vec<u32> {
-    let mut words = vec![path.len() as u32 - 1];
-    for (index, pair) in path.windows(2).enumerate() {
+/// Returns the actions of a path.
+fn actions_of(path: &[GridPose]) -> Vec<Action> {
+    let mut actions = Vec::with_capacity(path.len() - 1);
+    for pair in path.windows(2) {
         let leads = |&action: &Action| pair[0].after(action) == Some(pair[1]);
-        let action = ACTIONS.iter().position(leads).expect("a plan is made of actions");
-        let place = index % ACTIONS_PER_WORD;
-        if place == 0 {
-            words.push(0);
+        actions.push(ACTIONS.into_iter().find(leads).expect("a plan is made of actions"));
+    }
+    actions
+}
+
+/// Returns actions by their numbers, two bits each.
+fn packed_actions(actions: &[Action]) -> Vec<u32> {
+    let mut words = Vec::with_capacity(actions.len().div_ceil(ACTIONS_PER_WORD));
+    for chunk in actions.chunks(ACTIONS_PER_WORD) {
+        let mut word = 0;
+        for (place, action) in chunk.iter().enumerate() {
+            let number = ACTIONS.iter().position(|one| one == action).expect("one of those");
+            word |= (number as u32) << (2 * place);
         }
-        let last = words.len() - 1;
-        words[last] |= (action as u32) << (2 * place);
+        words.push(word);
     }
     words
 }

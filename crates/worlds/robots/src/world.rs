@@ -7,7 +7,7 @@ use super::delay::Delays;
 use super::effector::{EffectorModel, ObstacleRule};
 use super::policy::ConflictPolicy;
 use super::sensor::{Reading, SensorModel};
-use super::team::Team;
+use super::team::{Team, TeamOrders};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_error_models::beam::BeamModel;
@@ -224,18 +224,18 @@ pub struct RobotModel {
     pub behaviour: Arc<dyn Behaviour>,
     /// Whether it is decided from outside; asked once, because the answer is needed in every cycle.
     pub(super) is_external: bool,
-    /// Whether the orders from outside are those of the planner of its team.
-    pub(super) is_ordered: bool,
+    /// The orders from outside, if they are those of the planner of its team.
+    pub(super) team_orders: Option<TeamOrders>,
 }
 
 impl RobotModel {
     pub(crate) fn new(
         body: Arc<RobotBody>,
         behaviour: Arc<dyn Behaviour>,
-        is_ordered: bool,
+        team_orders: Option<TeamOrders>,
     ) -> Self {
-        let is_external = behaviour.is_external() || is_ordered;
-        Self { body, behaviour, is_external, is_ordered }
+        let is_external = behaviour.is_external() || team_orders.is_some();
+        Self { body, behaviour, is_external, team_orders }
     }
 }
 

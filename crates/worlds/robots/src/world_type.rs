@@ -137,6 +137,12 @@ impl AnyCompiled for Compiled {
         }
     }
 
+    fn privilege(&self) -> Option<&'static str> {
+        let mut teams = self.world.planner_teams.iter();
+        let has_privilege = teams.any(|team| team.leader.reports.is_none());
+        has_privilege.then_some("a planner knows the true places of all bodies, and who is late")
+    }
+
     fn resolve(&self, source: &Source) -> Result<ResolvedScenario, InputError> {
         bundle::resolve(source, self)
     }

@@ -99,9 +99,11 @@ fn tasks_are_the_same_bits_on_any_number_of_workers_in_any_storage_and_resumed()
 
 #[test]
 fn whole_plans_carry_tasks_out_and_are_the_same_when_resumed_in_the_midst_of_actions() {
-    for planner in
-        ["lacam\", budget_expansions = 100, window = 30, executor = \"adg", "prioritized"]
-    {
+    for planner in [
+        "lacam\", budget_expansions = 100, window = 30, executor = \"adg",
+        "prioritized",
+        "pibt\", report_every = 4, report_loss = 0.1, places = \"believed",
+    ] {
         let text = shelves("nearest").replace("method = \"pibt", &format!("method = \"{planner}"));
         let mut whole = run(&text);
         // Plans are made anew at each errand that is done, so the robots are slower than step by step.

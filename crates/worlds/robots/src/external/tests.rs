@@ -408,3 +408,96 @@ fn a_robot_that_is_late_or_in_an_action_is_where_its_planner_outside_knows_it_to
     assert!(run.metrics().total.distance_m > 0.0);
     assert_eq!(run.metrics().total.off_plan, 0, "no wheel slips, and nobody meets another");
 }
+
+/// Orders the robots of each team in turn to go to their goals by a plan, along the row first, whenever no plan is left.
+fn led_by_plans(run: &mut RobotsRun, cycles: u64) {
+    for _ in 0..cycles {
+        for team in 0..run.agent_teams().len() {
+            let all = observed(run, team);
+            let agents = run.agent_teams()[team].agents.clone();
+            if all["plan_left"].iter().any(|&left| left > 0) {
+                continue;
+            }
+            let k = (run.cycle() / 3) as usize % agents.len();
+            let way = [2 * k, 2 * k + 1].map(|n| all["goal_boxes"][n] - all["at_boxes"][n]);
+            let mut heading = all["heading"][k];
+            let mut plan = Vec::new();
+            for (axis, boxes) in way.into_iter().enumerate().filter(|&(_, boxes)| boxes != 0) {
+                let toward = axis as i64 + if boxes < 0 { 2 } else { 0 };
+                let turns = (toward - heading).rem_euclid(4);
+                plan.extend(match turns {
+                    3 => vec![2.0],
+                    turns => vec![1.0; turns as usize],
+                });
+                heading = toward;
+                plan.extend(vec![0.0; boxes.unsigned_abs() as usize]);
+            }
+            plan.resize(12, 3.0);
+            let order = MultiAgentOrder { order: "plan", agents: &agents[k..=k], values: &plan };
+            run.order(&order).expect("right");
+        }
+        run.advance(1);
+    }
+}
+
+#[test]
+fn plans_from_outside_are_carried_out_by_the_executor_and_replayed_and_resumed_to_the_bit() {
+    let text = LED.replace("\"external\"", "\"external\", executor = \"adg\", window = 12");
+    let run = |workers: usize| robots_run(&source(&text), workers).expect("it compiles");
+    let mut first = run(1);
+    let rows = recorded(&mut first, 300, |run| led_by_plans(run, 9.min(300 - run.cycle())));
+    let metrics = first.metrics();
+    assert!(metrics.tasks_finished > 0 && metrics.total.trips > 2, "{metrics:?}");
+    // Plans through a robot that stands are failures, and others are not.
+    assert!(metrics.plan_failures > 0, "{metrics:?}");
+    assert!(metrics.plans > metrics.plan_failures + 10, "{metrics:?}");
+    let mut again = run(3);
+    again.replay_orders(book(&rows)).expect("they were obeyed once");
+    again.advance(300);
+    assert_eq!(again.digest(), first.digest());
+    for at in [0, 1, 7, 50, 123] {
+        let mut before = run(1);
+        led_by_plans(&mut before, at);
+        let mut after = run(2);
+        after.restore(&before.checkpoint()).expect("the same scenario");
+        led_by_plans(&mut after, 300 - at);
+        assert_eq!(after.digest(), first.digest(), "resumed at {at}");
+    }
+}
+
+#[test]
+fn an_order_of_a_plan_stands_over_a_checkpoint() {
+    let text = LED
+        .replace("\"external\"", "\"external\", executor = \"blind\", window = 3")
+        .replace("action_cycles = 2\n", "");
+    let run = || robots_run(&source(&text), 1).expect("it compiles");
+    let mut whole = run();
+    let order = MultiAgentOrder { order: "plan", agents: &[0], values: &[0.0, 0.0, 3.0] };
+    whole.order(&order).expect("right");
+    let mut resumed = run();
+    resumed.restore(&whole.checkpoint()).expect("the same scenario");
+    for run in [&mut whole, &mut resumed] {
+        run.advance(2);
+        assert_eq!(observed(run, 0)["at_boxes"][..2], [2, 0]);
+    }
+    assert_eq!(resumed.digest(), whole.digest());
+}
+
+#[test]
+fn a_planner_outside_whose_robots_report_sees_them_where_they_should_be() {
+    let text =
+        LED.replace("\"external\"", "\"external\", places = \"believed\", report_every = 1000");
+    let mut run = robots_run(&source(&text), 1).expect("it compiles");
+    // It runs against the border of the map, and is believed to go on as far as there are boxes.
+    let order = |run: &mut RobotsRun, action: f64| {
+        let order = MultiAgentOrder { order: "action", agents: &[2], values: &[action] };
+        run.order(&order).expect("right");
+        run.advance(1);
+    };
+    for _ in 0..20 {
+        order(&mut run, 0.0);
+    }
+    let believed = observed(&run, 1)["at_boxes"][0];
+    let is = run.world().map_position(run.state().body(2).position()).0;
+    assert!(believed > i64::from(is), "it slipped and was late: {believed}, and is at {is}");
+}

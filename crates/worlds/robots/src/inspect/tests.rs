@@ -1,7 +1,7 @@
 use crate::kinds;
 use crate::{RobotsRun, robots_run};
 use sidestep_kernel::Simulation;
-use sidestep_kernel::view::{BodyId, FactValue, Inspection, MarkRole};
+use sidestep_kernel::view::{BodyId, FactValue, Inspection, MarkRole, MarkShape};
 use sidestep_scenario::Source;
 
 /// Two robots that want the box between them; the one with the smaller id goes first.
@@ -115,4 +115,65 @@ fn what_is_told_of_an_action_is_what_comes_of_it() {
             assert!(moved > 50, "{rule}, {policy}: {moved} moved");
         }
     }
+}
+
+/// The bodies for which a robot waits.
+fn waits_for(told: &Inspection) -> Vec<FactValue> {
+    let table = told.section("Plan").and_then(|section| section.table.as_ref());
+    let column = table.and_then(|table| table.column("waits for"));
+    column.into_iter().flatten().cloned().collect()
+}
+
+#[test]
+fn robots_in_a_gridlock_are_told_and_drawn_with_those_they_wait_for() {
+    let text = "format = 1\nworld = \"robots\"\nregime = \"reliable\"\n\
+        [map]\nbox_size_m = 0.5\nascii = \"....................\"\n\
+        [[robots]]\nat = [[2, 0, 0]]\nsensors = [\"sonar-ring\"]\n\
+        behaviour = { kind = \"shuttle\", a = [0, 0, 1, 1], b = [19, 0, 1, 1] }\n\
+        [[robots]]\nat = [[16, 0, 2]]\nsensors = [\"sonar-ring\"]\n\
+        behaviour = { kind = \"shuttle\", b = [0, 0, 1, 1], a = [19, 0, 1, 1] }\n";
+    let mut run = robots_run(&Source::new("s", text, ""), 1).unwrap_or_else(|e| panic!("{e}"));
+    let first = told(&run, 0);
+    assert_eq!(waits_for(&first), []);
+    assert_eq!(first.fact_value("Plan", "gridlock"), Some(&FactValue::None));
+    let way = first.marks_with_role(MarkRole::Plan).next().expect("a way");
+    assert_eq!(first.marks_with_role(MarkRole::Target).count(), 1);
+    let MarkShape::Line { points_m } = &way.shape else { panic!("a line: {way:?}") };
+    assert_eq!(points_m.first(), Some(&[1.25, 0.25, points_m[0][2]]), "from where it stands");
+    assert_eq!(points_m.last(), Some(&[0.25, 0.25, points_m[0][2]]), "to its goal");
+    run.advance(1_000);
+    let first = told(&run, 0);
+    assert_eq!(waits_for(&first), [FactValue::Body(robot(1))]);
+    let Some(FactValue::Text(words)) = first.fact_value("Plan", "gridlock") else {
+        panic!("in a gridlock: {:?}", first.section("Plan"))
+    };
+    assert!(words.starts_with("2 robots (0, 1)"), "{words}");
+    let labels: Vec<&str> =
+        first.marks_with_role(MarkRole::Wait).map(|mark| mark.label.as_str()).collect();
+    assert_eq!(labels, ["robot 0 waits for robot 1", "robot 1 waits for robot 0"]);
+}
+
+#[test]
+fn a_robot_that_a_planner_leads_is_told_with_the_rest_of_its_plan_and_who_passes_before_it() {
+    // Two that cross at (3, 3): the plan says who passes first.
+    let text = "format = 1\nworld = \"robots\"\nregime = \"reliable\"\n\
+        [map]\nbox_size_m = 1.0\nascii = \"\"\"\n###.###\n###.###\n###.###\n.......\n###.###\n###.###\n###.###\n\"\"\"\n\
+        [robots]\nat = [[0, 3, 0], [3, 0, 1]]\n\
+        behaviour = { kind = \"goto\", goals = [[6, 3], [3, 6]] }\n\
+        planner = { method = \"cbs\", budget_expansions = 10000 }\n";
+    let mut run = robots_run(&Source::new("s", text, ""), 1).unwrap_or_else(|e| panic!("{e}"));
+    let mut waits = Vec::new();
+    for _ in 0..12 {
+        for id in [0, 1] {
+            let told = told(&run, id);
+            let Some(way) = told.marks_with_role(MarkRole::Plan).next() else { continue };
+            let MarkShape::Line { points_m } = &way.shape else { panic!("a line: {way:?}") };
+            assert_eq!(told.fact_value("Now", "place"), Some(&points_m[0].into()), "{told:?}");
+            waits.extend(waits_for(&told).into_iter().map(|other| (id, other)));
+        }
+        run.advance(1);
+    }
+    let other = |id: u32| FactValue::Body(robot(1 - id));
+    assert!(!waits.is_empty(), "one lets the other pass");
+    assert!(waits.iter().all(|(id, named)| *named == other(*id)), "{waits:?}");
 }

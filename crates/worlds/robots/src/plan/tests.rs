@@ -53,13 +53,16 @@ fn digest(run: &RobotsRun) -> Digest {
 }
 
 /// Each method, and each executor.
-const PLANNERS: [&str; 6] = [
+const PLANNERS: [&str; 9] = [
     "method = \"pibt\"",
     "method = \"lacam\", budget_expansions = 100",
     "method = \"lacam\", executor = \"blind\", window = 12, budget_expansions = 100",
     "method = \"prioritized\", executor = \"replan\", replan_every = 15, max_deviation = 1",
     "method = \"prioritized\"",
     "method = \"cbs\", executor = \"replan\", budget_expansions = 5",
+    "method = \"pibt\", places = \"believed\", report_every = 3, report_loss = 0.2",
+    "method = \"lacam\", budget_expansions = 100, places = \"believed\"",
+    "method = \"prioritized\", places = \"believed\", report_every = 2",
 ];
 
 /// Returns the rooms with another planner.

@@ -136,6 +136,16 @@ impl RobotsWorld {
         }
     }
 
+    /// Returns the bodies, by rising id, that stand on all paths to a robot's goal, within the boxes that it looks ahead;
+    /// none where it can go on by one of them.
+    pub(super) fn bodies_in_way(&self, state: &RobotsState, id: EntityId) -> Vec<EntityId> {
+        let steps = circles::bodies_in_way(self, state, state.body(id));
+        let mut bodies: Vec<EntityId> = steps.into_iter().flatten().flatten().collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies
+    }
+
     /// Returns the number of entries of [`RobotsState::waits`].
     pub(super) fn waits_len(&self) -> usize {
         if self.goal_robots.is_empty() { 0 } else { self.bodies.len() }

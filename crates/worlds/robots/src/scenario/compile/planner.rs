@@ -1,12 +1,16 @@
 //! Teams that a planner leads: what their robots must be like, and how they are led.
 
-use super::super::{PlanExecutor, PlannerMethod, PlannerSection, RobotSection, StartPose};
+use super::super::{
+    KnownPlaces, PlanExecutor, PlannerMethod, PlannerSection, RobotSection, StartPose,
+};
 use super::bodies::{BodyGroup, action_cycles, period_cycles};
 use super::robots::side_boxes;
 use super::*;
 use crate::effector::{LEFT, RIGHT, STANDARD_ACTIONS, STAY, Side};
-use crate::team::TeamLeader;
+use crate::reports::Reports;
+use crate::team::{TeamLeader, TeamOrders};
 use sidestep_kernel::Seed;
+use sidestep_kernel::distr::Bernoulli;
 use sidestep_planners::{Executor, Method, TeamPlannerConfig, plan_file};
 use sidestep_scenario::file::read_text;
 use std::path::PathBuf;
@@ -29,6 +33,9 @@ const MAX_ORDERS: u32 = 10;
 /// Actions for which `replan` uses a plan unless the scenario says otherwise: about the way through a room.
 const DEFAULT_REPLAN_EVERY: u32 = 20;
 
+/// Actions of a plan that a caller orders unless the scenario says otherwise: about the way through a room.
+const DEFAULT_ORDERED_ACTIONS: u32 = 20;
+
 /// Most bytes of a plan: 10,000 robots with 10,000 actions each.
 const MAX_PLAN_BYTES: u64 = 100 << 20;
 
@@ -47,12 +54,13 @@ impl Compiler<'_> {
         let config = TeamPlannerConfig {
             method: self.planner_method(planner, &span)?,
             executor: executor(planner),
-            window: planner.window.as_ref().map(|window| window.get_ref().get() as u32),
+            window: window(planner),
+            may_fall_back: planner.places == KnownPlaces::Believed,
             may_follow: self.file.conflict_policy == ConflictPolicy::Simultaneous,
             action_steps: action_cycles(s),
             seed: Seed(0),
         };
-        Ok(Some(TeamLeader { config, is_external: planner.method == PlannerMethod::External }))
+        Ok(Some(TeamLeader { config, orders: orders(planner), reports: reports(planner) }))
     }
 
     fn planner_method(
@@ -63,7 +71,8 @@ impl Compiler<'_> {
         let budget = planner.budget_expansions.as_ref();
         let budget_expansions = budget.map_or(DEFAULT_BUDGET, |budget| budget.get_ref().get());
         match planner.method {
-            // What a caller orders needs no plan that is kept, as PIBT does not.
+            PlannerMethod::External if planner.executor.is_some() => Ok(Method::Ordered),
+            // What a caller orders action by action needs no plan that is kept, as PIBT does not.
             PlannerMethod::Pibt | PlannerMethod::External => Ok(Method::Pibt),
             PlannerMethod::Lacam => Ok(Method::Lacam { budget_expansions }),
             PlannerMethod::Prioritized => Ok(Method::Prioritized { max_orders: MAX_ORDERS }),
@@ -83,7 +92,10 @@ impl Compiler<'_> {
     fn check_planner_keys(&self, planner: &PlannerSection) -> Result<(), InputError> {
         let method = planner.method;
         let executor = planner.executor.as_ref().map(|executor| *executor.get_ref());
-        let is_stepwise = matches!(method, PlannerMethod::Pibt | PlannerMethod::External);
+        let is_external = method == PlannerMethod::External;
+        let is_stepwise = method == PlannerMethod::Pibt || is_external && executor.is_none();
+        // Plans that the planner does not make itself.
+        let is_made_elsewhere = method == PlannerMethod::File || is_external;
         let is_given = method == PlannerMethod::File;
         let has_budget = matches!(method, PlannerMethod::Lacam | PlannerMethod::Cbs);
         let is_replan = executor == Some(PlanExecutor::Replan);
@@ -92,21 +104,25 @@ impl Compiler<'_> {
         let every_span = planner.replan_every.as_ref().map(Spanned::span);
         let deviation_span = planner.max_deviation.as_ref().map(Spanned::span);
         let budget_span = planner.budget_expansions.as_ref().map(Spanned::span);
+        let has_reports = planner.places == KnownPlaces::Believed;
+        let report_every_span = planner.report_every.as_ref().map(Spanned::span);
+        let report_loss_span = planner.report_loss.as_ref().map(Spanned::span);
         let file_span = planner.file.as_ref().map(Spanned::span);
         let faults = [
             (
                 executor_span.clone().filter(|_| is_stepwise),
-                "`pibt` and `external` choose anew in each cycle, so they have no executor",
+                "`pibt` chooses anew in each cycle, so it has no executor",
                 "leave out `executor`, or give method = \"lacam\"",
             ),
             (
-                executor_span.filter(|_| is_given && is_replan),
-                "a plan from a file cannot be made anew",
+                executor_span.filter(|_| is_made_elsewhere && is_replan),
+                "a plan that is made elsewhere cannot be made anew",
                 "give executor = \"adg\" or \"blind\"",
             ),
             (
                 window_span.filter(|_| is_stepwise || is_given),
-                "`window` has no effect: only `lacam`, `prioritized` and `cbs` plan in windows",
+                "`window` has no effect: only `lacam`, `prioritized`, `cbs` and `external` with an executor plan in \
+                 windows",
                 "leave out `window`",
             ),
             (
@@ -128,6 +144,16 @@ impl Compiler<'_> {
                 file_span.filter(|_| !is_given),
                 "`file` has no effect without method = \"file\"",
                 "leave it out, or give method = \"file\"",
+            ),
+            (
+                report_every_span.filter(|_| !has_reports),
+                "`report_every` has no effect on a planner that knows the true places",
+                "leave it out, or add places = \"believed\"",
+            ),
+            (
+                report_loss_span.filter(|_| !has_reports),
+                "`report_loss` has no effect on a planner that knows the true places",
+                "leave it out, or add places = \"believed\"",
             ),
         ];
         for (span, cause, remedy) in faults {
@@ -249,6 +275,31 @@ impl Compiler<'_> {
         }
         Ok(())
     }
+}
+
+/// Returns the actions for which a plan is used, if the scenario says so.
+fn window(planner: &PlannerSection) -> Option<u32> {
+    planner.window.as_ref().map(|window| window.get_ref().get() as u32)
+}
+
+/// Returns what a caller orders: plans where there is an executor for them.
+fn orders(planner: &PlannerSection) -> Option<TeamOrders> {
+    let actions = window(planner).unwrap_or(DEFAULT_ORDERED_ACTIONS);
+    match (planner.method, &planner.executor) {
+        (PlannerMethod::External, Some(_)) => Some(TeamOrders::Plans { actions }),
+        (PlannerMethod::External, None) => Some(TeamOrders::Actions),
+        _ => None,
+    }
+}
+
+/// Returns how robots report to a planner that does not know the true places.
+fn reports(planner: &PlannerSection) -> Option<Reports> {
+    let every = planner.report_every.as_ref();
+    let loss = planner.report_loss.as_ref();
+    (planner.places == KnownPlaces::Believed).then(|| Reports {
+        every_steps: every.map_or(1, |every| every.get_ref().get() as u32),
+        loss: Bernoulli::new(loss.map_or(0.0, |loss| f64::from(*loss.get_ref()))),
+    })
 }
 
 /// Returns how plans are carried out; of `pibt`, which has none, it means nothing.

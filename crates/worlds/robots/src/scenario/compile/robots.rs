@@ -23,7 +23,7 @@ impl Compiler<'_> {
         let body = Arc::new(self.robot_body(s, size)?);
         let leader = self.leader(s, &body.effector)?;
         let has_planner = leader.is_some();
-        let is_ordered = leader.as_ref().is_some_and(|leader| leader.is_external);
+        let team_orders = leader.as_ref().and_then(|leader| leader.orders);
         let robot = RobotKind { size, body: &body, has_planner };
         let tasks = self.tasks(s, count)?.map(Arc::new);
         let behaviour = match tasks {
@@ -31,7 +31,7 @@ impl Compiler<'_> {
             None => self.behaviour(s.behaviour.as_ref(), robot)?,
         };
         let actions = Arc::clone(&body.actions);
-        let role = Role::Robot(RobotModel::new(body, behaviour, is_ordered));
+        let role = Role::Robot(RobotModel::new(body, behaviour, team_orders));
         let ty = self.body_type(&s.kind, (size, size), actions, role)?;
         let ty = GroupTypes::Shared(self.add_type(ty, &span)?);
         let group = BodyGroup {
@@ -69,7 +69,7 @@ impl Compiler<'_> {
         let body = Arc::new(self.robot_body(s, size)?);
         let leader = self.leader(s, &body.effector)?;
         let has_planner = leader.is_some();
-        let is_ordered = leader.as_ref().is_some_and(|leader| leader.is_external);
+        let team_orders = leader.as_ref().and_then(|leader| leader.orders);
         let routes = RoutePlanner::new(&self.map, size, None, &body, has_planner);
         let alone = (!has_planner).then(|| self.avoidance(None, &routes, &body));
         let mut places = Vec::new();
@@ -78,7 +78,7 @@ impl Compiler<'_> {
             let goals = vec![self.scen_goal(scen, row, &routes)?];
             let avoidance = alone.clone().unwrap_or_else(|| Avoidance::Team(vec![vec![row.goal]]));
             let behaviour: Arc<dyn Behaviour> = Arc::new(Goto { goals, repeat: false, avoidance });
-            let model = RobotModel::new(Arc::clone(&body), behaviour, is_ordered);
+            let model = RobotModel::new(Arc::clone(&body), behaviour, team_orders);
             let actions = Arc::clone(&body.actions);
             let ty = self.body_type(&s.kind, (size, size), actions, Role::Robot(model))?;
             types.push(self.add_type(ty, span)?);
