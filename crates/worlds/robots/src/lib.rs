@@ -28,6 +28,7 @@ mod cycle_context;
 pub mod decide;
 mod delay;
 mod delayed_turn;
+mod errand_fields;
 mod errands;
 pub mod exact;
 mod external;

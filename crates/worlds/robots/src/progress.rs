@@ -16,7 +16,7 @@ pub const CHECK_CYCLES: Cycle = 50;
 /// The progress of all robots with goals.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Progress {
-    /// In the order of `RobotsWorld::goal_robots`.
+    /// In the order of `RobotsWorld::watched_robots`.
     pub(super) approaches: Vec<Approach>,
     /// Number of cycles before the last look.
     pub(super) checked: Cycle,
@@ -31,9 +31,9 @@ pub struct Progress {
 /// The way of one robot to its present goal.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Approach {
-    /// The number of the goal among those of its behavior; none for a robot that has none left.
+    /// The number of the goal among those of its behavior, or of its errand; none for a robot that has none left.
     pub(super) goal: Option<u32>,
-    /// Its place at the last look,
+    /// Its place at the last look, of a robot with tasks that at `nearer_at`,
     pub(super) place: (u32, u32),
     /// and its moves until then.
     pub(super) moves: u32,

@@ -1,10 +1,11 @@
 //! The teams that planners lead: their robots, and what a planner remembers of them.
 
+use crate::errand_fields::ErrandFields;
 use crate::reports::{Belief, Reports};
 use crate::team_memory::TeamMemory;
 use crate::team_words;
 use sidestep_kernel::{EntityId, Seed};
-use sidestep_map::planning::FreeSpace;
+use sidestep_map::planning::{FlowField, FreeSpace};
 use sidestep_planners::tasks::TaskState;
 use sidestep_planners::{
     Action, Dispatcher, GridPose, Method, PlanCounts, TeamPlanner, TeamPlannerConfig,
@@ -58,6 +59,9 @@ pub(crate) struct TeamState {
     memory: Mutex<TeamMemory>,
     /// The tasks of a team that has some; only the phase *plan* writes them.
     tasks: Option<Mutex<TaskMemory>>,
+    /// The paths to errands, on floors where robots with tasks are looked at. No result depends on which are kept, so copies
+    /// of a state share them.
+    errand_fields: Option<Arc<Mutex<ErrandFields>>>,
 }
 
 /// The tasks of a team, and who gives them to its robots.
@@ -89,7 +93,7 @@ impl TeamState {
             has_reported: vec![false; robots],
         };
         let planner = Arc::new(Mutex::new(planner));
-        Self { planner, is_stepwise, memory: Mutex::new(memory), tasks: None }
+        Self { planner, is_stepwise, memory: Mutex::new(memory), tasks: None, errand_fields: None }
     }
 
     /// Returns the same team with tasks, which were checked.
@@ -104,7 +108,10 @@ impl TeamState {
             let state = dispatcher.begin(sizes.len());
             Mutex::new(TaskMemory { dispatcher: Arc::new(Mutex::new(dispatcher)), state })
         });
-        Self { tasks, ..self }
+        let size = sizes.first().copied().unwrap_or(1);
+        let errand_fields = tasks.as_ref().and_then(|_| ErrandFields::new(free, size));
+        let errand_fields = errand_fields.map(|fields| Arc::new(Mutex::new(fields)));
+        Self { tasks, errand_fields, ..self }
     }
 
     /// Returns the tasks of a team that has some.
@@ -116,6 +123,24 @@ impl TeamState {
     pub(crate) fn goal_of_task(&self, robot: usize) -> Option<(u32, u32)> {
         let memory = self.tasks()?;
         lock(&memory.dispatcher).goal(&memory.state, robot)
+    }
+
+    /// Returns the errand of a robot: a number that is another one for its next errand, and where it is. None without a
+    /// task, and on floors where robots with tasks are not looked at.
+    pub(crate) fn errand(&self, robot: usize) -> Option<(u32, (u32, u32))> {
+        self.errand_fields.as_ref()?;
+        let memory = self.tasks()?;
+        let own = memory.state.agents[robot]?;
+        let place = lock(&memory.dispatcher).goal(&memory.state, robot)?;
+        // Tasks that differ by 2^26 are far apart in time.
+        Some(((own.task as u32) << 6 | own.visited & 63, place))
+    }
+
+    /// Returns the paths to the errand of a robot, as [`Self::errand`].
+    pub(crate) fn errand_field(&self, robot: usize) -> Option<Arc<FlowField>> {
+        let (_, place) = self.errand(robot)?;
+        let fields = self.errand_fields.as_ref()?;
+        Some(lock(fields).to_errand(place))
     }
 
     /// Records the actions of a plan that a caller orders for a robot; the others wait, unless they are ordered, too.
@@ -136,7 +161,8 @@ impl TeamState {
         let memory = Mutex::new(lock(&self.memory).clone());
         let tasks = self.tasks().map(|tasks| Mutex::new(tasks.clone()));
         let planner = Arc::clone(&self.planner);
-        Self { planner, is_stepwise: self.is_stepwise, memory, tasks }
+        let errand_fields = self.errand_fields.clone();
+        Self { planner, is_stepwise: self.is_stepwise, memory, tasks, errand_fields }
     }
 
     /// Returns a robot's share of the state in words.

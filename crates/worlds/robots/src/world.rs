@@ -118,6 +118,8 @@ pub struct RobotsWorld {
     pub(super) planner_teams: Vec<Team>,
     /// The robots whose behavior has goals, by rising id.
     pub(super) goal_robots: Vec<EntityId>,
+    /// The robots that are watched for gridlocks: those, and those with tasks, by rising id.
+    pub(super) watched_robots: Vec<EntityId>,
     /// Whether a run is over at its first gridlock.
     pub(super) stops_at_gridlock: bool,
     /// Whether there are robots that ask each other to make room.

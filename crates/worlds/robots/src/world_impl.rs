@@ -96,7 +96,7 @@ impl World for RobotsWorld {
     }
 
     fn check_interval(&self) -> Option<Cycle> {
-        (!self.goal_robots.is_empty()).then_some(CHECK_CYCLES)
+        (!self.watched_robots.is_empty()).then_some(CHECK_CYCLES)
     }
 
     fn check(&self, state: &mut RobotsState, collector: &mut Collector, now: Cycle) {
@@ -186,7 +186,7 @@ impl CheckpointableWorld for RobotsWorld {
     ) -> Result<RobotsState, CheckpointError> {
         let fits = saved.bodies.len() == self.bodies.len()
             && saved.visited.len() == self.map.cells().len().div_ceil(8)
-            && saved.progress.approaches.len() == self.goal_robots.len()
+            && saved.progress.approaches.len() == self.watched_robots.len()
             && saved.waits.len() == self.waits_len();
         if !fits {
             return Err(CheckpointError::Damaged);

@@ -35,6 +35,7 @@ use crate::effector::{ActionId, EffectorModel, FORWARD, MAX_PATH_STEPS, Obstacle
 use crate::policy::ConflictPolicy;
 use crate::purpose;
 use crate::sensor::SensorModel;
+use crate::team::Team;
 use crate::world::{
     BEAM_CHUNK_BOXES, Body, BodyType, Door, MountedSensor, Mover, Radio, Regime, RobotBody,
     RobotModel, RobotsWorld, Role, StorageOrder,
@@ -233,6 +234,7 @@ impl<'a> Compiler<'a> {
             radio,
             teams: Arc::default(),
             robots,
+            watched_robots: watched_robots(&goal_robots, &planner_teams),
             planner_teams,
             goal_robots,
             stops_at_gridlock: self.file.stop.gridlock,
@@ -331,6 +333,15 @@ impl<'a> Compiler<'a> {
         }
         Ok(rank)
     }
+}
+
+/// Returns the robots that are watched for gridlocks, by rising id.
+fn watched_robots(goal_robots: &[EntityId], teams: &[Team]) -> Vec<EntityId> {
+    let with_tasks = teams.iter().filter(|team| team.tasks.is_some());
+    let mut all = goal_robots.to_vec();
+    all.extend(with_tasks.flat_map(|team| team.robots.clone()));
+    all.sort_unstable();
+    all
 }
 
 /// Returns as many rings of wall as the longest path has steps, and as a beam may be read past a

@@ -13,6 +13,7 @@ use crate::state::{BodyState, RobotsState};
 use crate::world::RobotsWorld;
 use sidestep_kernel::EntityId;
 use sidestep_kernel::space::{GridPosition, Occupant};
+use sidestep_map::planning::FlowField;
 
 /// Boxes of a path within which a robot waits for a body: those that sense others keep away from them.
 const MAX_BOXES_AHEAD: usize = 8;
@@ -42,14 +43,14 @@ pub(super) fn bodies_in_way(
     world: &RobotsWorld,
     state: &RobotsState,
     body: &BodyState,
+    field: &FlowField,
 ) -> Option<Vec<Vec<EntityId>>> {
-    let (_, field) = world.goal_of(body)?;
     let (col, row) = world.map_position(body.position());
     let leads_nearer =
         |&direction: &u8| field.rise(col, row, direction).is_some_and(|rise| rise < 0);
     let mut in_way = Vec::new();
     for direction in (0..4).filter(leads_nearer) {
-        let bodies = first_bodies_on_path(world, state, body, direction);
+        let bodies = first_bodies_on_path(world, state, (body, field), direction);
         if bodies.is_empty() {
             return None;
         }
@@ -62,10 +63,9 @@ pub(super) fn bodies_in_way(
 fn first_bodies_on_path(
     world: &RobotsWorld,
     state: &RobotsState,
-    body: &BodyState,
+    (body, field): (&BodyState, &FlowField),
     first_direction: u8,
 ) -> Vec<EntityId> {
-    let Some((_, field)) = world.goal_of(body) else { return Vec::new() };
     let mut position = body.position();
     let mut next = Some(first_direction);
     for _ in 0..MAX_BOXES_AHEAD {

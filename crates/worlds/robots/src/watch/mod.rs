@@ -8,11 +8,16 @@
 mod circles;
 
 use super::perceive::memory_of;
+use super::plan::place_in_team;
 use super::progress::{Approach, Gridlock, GridlockEvent, Obstruction, Progress};
 use super::state::{BodyState, RobotsState};
 use super::world::{RobotsWorld, Role};
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_map::planning::FlowField;
+
+/// Boxes that a robot with tasks has to get away from a place to be stalled there no more: more than robots stray that push
+/// each other to and fro.
+const FAR_BOXES: u32 = 8;
 
 /// Cycles without coming nearer to its goal after which a robot may be in a gridlock: planning robots draw new ranks
 /// and stray after 64 to 95 actions in vain, and most jams come loose then, or the next time.
@@ -21,9 +26,9 @@ const STALL_CYCLES: Cycle = 200;
 impl RobotsWorld {
     /// Returns the progress of robots that begin to be looked at.
     pub(super) fn start_progress(&self, state: &RobotsState, now: Cycle) -> Progress {
-        let approaches = self.goal_robots.iter().map(|&id| {
+        let approaches = self.watched_robots.iter().map(|&id| {
             let mut approach = Approach::default();
-            self.update_approach(&mut approach, state.body(id), now);
+            self.update_approach(&mut approach, state, id, now);
             approach
         });
         Progress { approaches: approaches.collect(), checked: now, ..Progress::default() }
@@ -38,15 +43,16 @@ impl RobotsWorld {
     ) -> Vec<GridlockEvent> {
         progress.checked = now;
         let mut stalled = Vec::new();
-        for (approach, &id) in progress.approaches.iter_mut().zip(&self.goal_robots) {
-            let body = state.body(id);
-            self.update_approach(approach, body, now);
+        for (approach, &id) in progress.approaches.iter_mut().zip(&self.watched_robots) {
+            self.update_approach(approach, state, id, now);
             if approach.goal.is_none() || approach.nearer_at == now {
                 continue;
             }
             let window = self.stall_cycles(id);
             approach.obstructions.retain(|obstruction| now - obstruction.at < window);
-            let steps = circles::bodies_in_way(self, state, body);
+            // The paths to an errand are searched for only where it is likely that the robot is stalled.
+            let is_likely = !self.has_errands(id) || now - approach.nearer_at >= window / 2;
+            let steps = if is_likely { self.steps_in_way(state, id) } else { None };
             approach.obstructions.extend(steps.map(|steps| Obstruction { at: now, steps }));
             if now - approach.nearer_at >= window {
                 stalled.push(id);
@@ -74,7 +80,7 @@ impl RobotsWorld {
         progress: &'a Progress,
         stalled: &[EntityId],
     ) -> Vec<circles::WaitingRobot<'a>> {
-        let robots = self.goal_robots.iter().zip(&progress.approaches);
+        let robots = self.watched_robots.iter().zip(&progress.approaches);
         let waiting = robots.filter(|(id, _)| stalled.binary_search(id).is_ok());
         waiting
             .map(|(&id, approach)| circles::WaitingRobot {
@@ -109,12 +115,22 @@ impl RobotsWorld {
 
     /// Returns the last look at which one of some robots had come nearer to its goal.
     fn last_nearer(&self, progress: &Progress, robots: &[EntityId]) -> Cycle {
-        let places = robots.iter().filter_map(|id| self.goal_robots.binary_search(id).ok());
+        let places = robots.iter().filter_map(|id| self.watched_robots.binary_search(id).ok());
         places.map(|place| progress.approaches[place].nearer_at).max().unwrap_or(0)
     }
 
     /// Brings an approach up to date with a robot's present place and goal.
-    fn update_approach(&self, approach: &mut Approach, body: &BodyState, now: Cycle) {
+    fn update_approach(
+        &self,
+        approach: &mut Approach,
+        state: &RobotsState,
+        id: EntityId,
+        now: Cycle,
+    ) {
+        let body = state.body(id);
+        if self.has_errands(id) {
+            return self.update_errand_approach(approach, state, body, now);
+        }
         let place = self.map_position(body.position());
         let goal = self.goal_of(body);
         let number = goal.map(|(number, _)| number);
@@ -136,10 +152,50 @@ impl RobotsWorld {
         }
     }
 
+    /// Brings the approach of a robot with tasks up to date. It counts as coming nearer when it gets far from where it was:
+    /// to know what its path costs, paths from everywhere to its errand would have to be searched for at each errand.
+    fn update_errand_approach(
+        &self,
+        approach: &mut Approach,
+        state: &RobotsState,
+        body: &BodyState,
+        now: Cycle,
+    ) {
+        let place = self.map_position(body.position());
+        let errand = place_in_team(self, body.id)
+            .and_then(|(team, robot)| state.planner_teams[team].errand(robot));
+        let number = errand.map(|(number, _)| number);
+        let boxes = approach.place.0.abs_diff(place.0).max(approach.place.1.abs_diff(place.1));
+        if number.is_none() || number != approach.goal || boxes >= FAR_BOXES {
+            approach.place = place;
+            approach.nearer_at = now;
+            approach.obstructions.clear();
+        }
+        approach.goal = number;
+        approach.moves = body.moves.get();
+    }
+
+    /// Returns whether a robot is one of a team with tasks.
+    fn has_errands(&self, id: EntityId) -> bool {
+        let team = place_in_team(self, id).map(|(team, _)| &self.planner_teams[team]);
+        team.is_some_and(|team| team.tasks.is_some())
+    }
+
+    /// Returns the bodies in the way of a robot by the first steps of its paths, see [`circles::bodies_in_way`].
+    fn steps_in_way(&self, state: &RobotsState, id: EntityId) -> Option<Vec<Vec<EntityId>>> {
+        let body = state.body(id);
+        if let Some((_, field)) = self.goal_of(body) {
+            return circles::bodies_in_way(self, state, body, field);
+        }
+        let (team, robot) = place_in_team(self, id)?;
+        let field = state.planner_teams[team].errand_field(robot)?;
+        circles::bodies_in_way(self, state, body, &field)
+    }
+
     /// Returns the bodies, by rising id, that stand on all paths to a robot's goal, within the boxes that it looks ahead;
     /// none where it can go on by one of them.
     pub(super) fn bodies_in_way(&self, state: &RobotsState, id: EntityId) -> Vec<EntityId> {
-        let steps = circles::bodies_in_way(self, state, state.body(id));
+        let steps = self.steps_in_way(state, id);
         let mut bodies: Vec<EntityId> = steps.into_iter().flatten().flatten().collect();
         bodies.sort_unstable();
         bodies.dedup();

@@ -248,3 +248,39 @@ fn what_ends_a_run_is_in_its_digest() {
     assert_eq!(without.snapshot().digest(), run.snapshot().digest(), "the bodies are the same");
     assert_eq!(without.digest(), without.snapshot().digest());
 }
+
+/// Two robots in a lane that is as wide as they are, which both have to go to both of its ends.
+const ERRANDS: &str = "[map]\nascii = \"............\"\n\
+    [[robots]]\nat = [[2, 0, 0], [9, 0, 2]]\nplanner = { method = \"pibt\" }\n\
+    tasks = { list = [[[11, 0], [0, 0]]], policy = \"fifo\" }\n";
+
+#[test]
+fn robots_with_tasks_that_block_each_other_for_good_are_in_a_gridlock() {
+    let mut first = run(ERRANDS);
+    first.advance(600);
+    assert_eq!(metric(&first, "tasks_finished"), json!(0));
+    let found = metric(&first, "first_gridlock_cycle").as_u64().expect("a gridlock");
+    assert!(found <= 500, "it is found within 500 cycles: {found}");
+    assert_eq!(metric(&first, "robots_in_gridlock"), json!(2));
+    // It is found at the same time in a run that is resumed before it.
+    let mut before = run(ERRANDS);
+    before.advance(found - 70);
+    let mut resumed = run(ERRANDS);
+    resumed.restore(&before.checkpoint()).expect("the same scenario");
+    resumed.advance(600 - (found - 70));
+    assert_eq!(resumed.digest(), first.digest());
+    assert_eq!(metric(&resumed, "first_gridlock_cycle"), json!(found));
+}
+
+#[test]
+fn robots_with_tasks_that_get_on_are_in_no_gridlock() {
+    let open = ERRANDS.replace("\"............\"", "\"\"\"\n............\n............\n\"\"\"");
+    let mut run = run(&open);
+    run.advance(3_000);
+    assert_eq!(metric(&run, "gridlocks"), json!(0));
+    assert!(
+        metric(&run, "tasks_finished").as_u64() > Some(100),
+        "{}",
+        metric(&run, "tasks_finished")
+    );
+}

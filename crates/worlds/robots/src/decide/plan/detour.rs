@@ -1,7 +1,7 @@
 //! The cheapest path through the places around a robot, to where the path of the static map goes on.
 
 use super::local_box_set::LocalBoxSet;
-use super::local_grid::{EXIT_LEVELS, LocalGrid, PRICES};
+use super::local_grid::{EXIT_LEVELS, Exits, LocalGrid, PRICES};
 use super::local_view::LocalView;
 use super::step_costs::StepCosts;
 use crate::effector::HEADINGS;
@@ -14,10 +14,16 @@ const PENDING_LEVELS: usize = 64;
 /// Dijkstra's search backward from the exits, over places and headings. All places of one cost and heading are one word,
 /// so that a step of all of them is a shift.
 pub(super) fn first_step(view: &LocalView<'_>, prices: StepCosts) -> Option<u8> {
-    let grid = LocalGrid::new(view, prices)?;
+    let mut exits = [LocalBoxSet::default(); EXIT_LEVELS];
+    let grid = LocalGrid::new(view, prices, &mut exits)?;
+    let mut steps: [StepsByCost; 4] = Default::default();
+    for (heading, steps) in (0..).zip(&mut steps) {
+        steps.fill(&grid, prices.off_lane, heading);
+    }
     let mut search = Search {
         grid: &grid,
-        steps: [0, 1, 2, 3].map(|heading| StepsByCost::new(&grid, prices.off_lane, heading)),
+        exits: &exits,
+        steps: &steps,
         pending: [[LocalBoxSet::default(); 4]; PENDING_LEVELS],
         settled: [LocalBoxSet::default(); 4],
         last_level: 0,
@@ -64,8 +70,9 @@ fn first_cost(view: &LocalView<'_>, grid: &LocalGrid, prices: StepCosts, directi
 
 struct Search<'a> {
     grid: &'a LocalGrid,
+    exits: &'a Exits,
     /// The steps of each heading.
-    steps: [StepsByCost; 4],
+    steps: &'a [StepsByCost; 4],
     /// Places and headings that are reached at a cost, by the cost modulo the number of levels.
     pending: [[LocalBoxSet; 4]; PENDING_LEVELS],
     /// Those that have been reached at any cost before, by heading.
@@ -84,14 +91,13 @@ struct StepsByCost {
 }
 
 impl StepsByCost {
-    fn new(grid: &LocalGrid, off_lane_price: u16, heading: u8) -> Self {
-        let mut steps = Self::default();
+    /// Adds all steps with a heading.
+    fn fill(&mut self, grid: &LocalGrid, off_lane_price: u16, heading: u8) {
         let off_lane = grid.off_lane[usize::from(heading)];
         for &(places, price) in &grid.prices {
-            steps.push(places.without(off_lane), heading, price);
-            steps.push(places.intersection(off_lane), heading, price + off_lane_price);
+            self.push(places.without(off_lane), heading, price);
+            self.push(places.intersection(off_lane), heading, price + off_lane_price);
         }
-        steps
     }
 
     /// Adds the steps into places of a price.
@@ -107,7 +113,7 @@ impl Search<'_> {
     /// Settles the places of a cost, and returns those of each heading.
     fn settle(&mut self, level: usize) -> [LocalBoxSet; 4] {
         let mut reached = std::mem::take(&mut self.pending[level % PENDING_LEVELS]);
-        let exits = self.grid.exits.get(level).copied().unwrap_or_default();
+        let exits = self.exits.get(level).copied().unwrap_or_default();
         for (heading, places) in reached.iter_mut().enumerate() {
             *places = places.union(exits).without(self.settled[heading]);
             self.settled[heading] = self.settled[heading].union(*places);
@@ -153,10 +159,15 @@ mod tests {
 
     /// Returns the least cost over all first steps in a direction, by going over places and headings until no cost
     /// falls any more.
-    fn least_cost(view: &LocalView<'_>, grid: &LocalGrid, prices: StepCosts, first: u8) -> usize {
+    fn least_cost(
+        view: &LocalView<'_>,
+        (grid, exits): (&LocalGrid, &Exits),
+        prices: StepCosts,
+        first: u8,
+    ) -> usize {
         let mut costs = [[usize::MAX; 4]; 81];
         let number = |(col, row): (i32, i32)| ((row + 4) * 9 + col + 4) as usize;
-        for (level, places) in grid.exits.iter().enumerate() {
+        for (level, places) in exits.iter().enumerate() {
             places.places().for_each(|at| costs[number(at)] = [level; 4]);
         }
         let price = |at: (i32, i32), heading: u8| {
@@ -206,11 +217,12 @@ mod tests {
             let view =
                 LocalView { field: &field, at, heading, blocked, vague, is_careful: true, is_done: false, is_alone: false };
             let step = first_step(&view, prices);
-            let Some(grid) = LocalGrid::new(&view, prices) else {
+            let mut exits = [LocalBoxSet::default(); EXIT_LEVELS];
+            let Some(grid) = LocalGrid::new(&view, prices, &mut exits) else {
                 prop_assert_eq!(step, None);
                 return Ok(());
             };
-            let costs = [0, 1, 2, 3].map(|direction| least_cost(&view, &grid, prices, direction));
+            let costs = [0, 1, 2, 3].map(|direction| least_cost(&view, (&grid, &exits), prices, direction));
             let least = costs.into_iter().min().filter(|&cost| cost < usize::MAX);
             prop_assert_eq!(step.map(|direction| costs[usize::from(direction)]), least, "{:?}", costs);
         }

@@ -65,6 +65,8 @@ struct BeamPath {
     /// The observation that walls truly have.
     wall: u8,
     crossed: Box<[BeamBox]>,
+    /// By distance class: the number of its first box.
+    starts: Box<[usize]>,
 }
 
 /// A box that a beam crosses, seen from the robot's lower-left box.
@@ -87,44 +89,48 @@ struct Crossing {
 }
 
 impl BeamPath {
-    /// Returns the stretch of the beam in which there is something that is not the wall behind it.
-    fn occupied_range(&self, reading: Reading, free: &FreeWindow) -> Option<Range<usize>> {
+    fn new(wall: u8, crossed: Box<[BeamBox]>) -> Self {
+        let last_class = crossed.last().map_or(0, |one| one.class);
+        let first_of_class = |class: u8| crossed.partition_point(|one| one.class < class);
+        // One more than there are, so that each class ends where the next one begins.
+        let starts = (0..=last_class + 1).map(first_of_class).collect();
+        Self { wall, crossed, starts }
+    }
+
+    /// Returns the number of the first box of a class, or of a later one; that of all boxes where there is none.
+    fn start_of(&self, class: u8) -> usize {
+        self.starts.get(usize::from(class)).copied().unwrap_or(self.crossed.len())
+    }
+
+    /// Returns the number of the first box with a wall; that of all boxes where there is none.
+    fn first_wall(&self, free: &FreeWindow) -> usize {
+        let first = self.crossed.iter().position(|crossed| crossed.is_wall(free));
+        first.unwrap_or(self.crossed.len())
+    }
+
+    /// Returns the stretch of the beam in which there is something that is not the wall behind it; `first_wall` is that of
+    /// the beam.
+    fn occupied_range(&self, reading: Reading, first_wall: usize) -> Option<Range<usize>> {
         if reading.observation == NOTHING {
             return None;
         }
-        let first = self.crossed.iter().position(|c| c.class >= reading.class)?;
-        let mut end = first;
-        for crossed in &self.crossed {
-            if crossed.is_wall(free) {
-                let explains = crossed.class == reading.class && reading.observation == self.wall;
-                // A report from behind a wall is an error, because no beam goes through.
-                if explains || crossed.class < reading.class {
-                    return None;
-                }
-                break;
-            }
-            if crossed.class > reading.class {
-                break;
-            }
-            end += usize::from(crossed.class == reading.class);
+        let first = self.start_of(reading.class);
+        // Classes that no box of the beam has are beyond what is looked at.
+        let end = self.start_of(reading.class.saturating_add(1));
+        if first_wall >= end {
+            return (first < end).then_some(first..end);
         }
-        (first < end).then_some(first..end)
+        // A report from behind a wall is an error, because no beam goes through, and one of the wall is explained.
+        let is_explained = first_wall < first || reading.observation == self.wall;
+        (!is_explained && first < first_wall).then_some(first..first_wall)
     }
 
-    /// Returns the boxes of [`Self::occupied_range`].
-    fn occupied_segment(&self, reading: Reading, free: &FreeWindow) -> Option<OccupiedSegment<'_>> {
-        let boxes = &self.crossed[self.occupied_range(reading, free)?];
-        Some(OccupiedSegment { boxes, is_near: reading.class == 0 })
-    }
-}
-
-impl BeamPath {
     /// Returns what a reading says of one of the boxes: votes for it being free, -1 if something may be in it, and 0
-    /// of a box that it knows nothing of.
-    fn votes(&self, number: usize, reading: Reading, free: &FreeWindow, passed: i32) -> i32 {
+    /// of a box that it knows nothing of. `first_wall` is that of the beam.
+    fn votes(&self, number: usize, reading: Reading, first_wall: usize, passed: i32) -> i32 {
         let class = self.crossed[number].class;
         let is_passed = reading.observation == NOTHING || class < reading.class;
-        let is_behind_wall = self.crossed[..=number].iter().any(|crossed| crossed.is_wall(free));
+        let is_behind_wall = first_wall <= number;
         if is_behind_wall || !is_passed && class > reading.class {
             return 0;
         }
@@ -132,10 +138,41 @@ impl BeamPath {
             return passed;
         }
         // The thing is in a box of this class; where it is the wall behind them, they are free.
-        let of_class = self.crossed[number..].iter().take_while(|one| one.class == class);
-        let is_explained =
-            reading.observation == self.wall && of_class.into_iter().any(|one| one.is_wall(free));
+        let is_wall_of_class = first_wall < self.start_of(class.saturating_add(1));
+        let is_explained = reading.observation == self.wall && is_wall_of_class;
         if is_explained { passed } else { -1 }
+    }
+}
+
+/// Where the beams around a robot meet walls: each is looked for once, when it is asked for, because most beams never are.
+struct BeamWalls<'a> {
+    free: &'a FreeWindow,
+    beams: &'a [BeamPath],
+    /// By beam; [`UNKNOWN_WALL`] for those that were not looked for yet. Beams beyond are looked for each time.
+    first: [u8; MAX_KEPT_WALLS],
+}
+
+const UNKNOWN_WALL: u8 = u8::MAX;
+const MAX_KEPT_WALLS: usize = 64;
+
+impl<'a> BeamWalls<'a> {
+    fn new(free: &'a FreeWindow, beams: &'a [BeamPath]) -> Self {
+        Self { free, beams, first: [UNKNOWN_WALL; MAX_KEPT_WALLS] }
+    }
+
+    /// Returns the number of the first box of a beam with a wall; that of all boxes where there is none.
+    fn first_wall(&mut self, beam: usize) -> usize {
+        match self.first.get_mut(beam) {
+            Some(first) if *first != UNKNOWN_WALL => usize::from(*first),
+            kept => {
+                let found = self.beams[beam].first_wall(self.free);
+                // Beams are as long as the square is wide: there is room for the number of any box.
+                if let (Some(first), Ok(found)) = (kept, u8::try_from(found)) {
+                    *first = found;
+                }
+                found
+            }
+        }
     }
 }
 
@@ -183,7 +220,8 @@ impl BeamModel {
             }
             // Only now, because most readings speak of nothing near.
             let free = free.get_or_insert_with(|| self.free_window(percept.at));
-            let occupied = beams[step_beam.beam].occupied_range(reading, free);
+            let beam = &beams[step_beam.beam];
+            let occupied = beam.occupied_range(reading, beam.first_wall(free));
             let meets = |range: Range<usize>| {
                 range.start < step_beam.boxes.end && step_beam.boxes.start < range.end
             };
@@ -205,14 +243,21 @@ impl BeamModel {
         if percept.readings.iter().all(|reading| reading.observation == NOTHING) {
             return None;
         }
-        let free = &self.free_window(percept.at);
+        let free = self.free_window(percept.at);
+        let beams = &self.beams[usize::from(percept.heading)];
+        let mut walls = BeamWalls::new(&free, beams);
         let mut costmap = None;
-        for (beam, &reading) in
-            self.beams[usize::from(percept.heading)].iter().zip(percept.readings)
-        {
-            let Some(segment) = beam.occupied_segment(reading, free) else { continue };
+        for (number, (beam, &reading)) in beams.iter().zip(percept.readings).enumerate() {
+            if reading.observation == NOTHING {
+                continue;
+            }
+            let Some(range) = beam.occupied_range(reading, walls.first_wall(number)) else {
+                continue;
+            };
+            let segment =
+                OccupiedSegment { boxes: &beam.crossed[range], is_near: reading.class == 0 };
             let costmap = costmap.get_or_insert_with(LocalCostmap::default);
-            self.block(&segment, percept, free, costmap);
+            self.block(&segment, percept, &mut walls, costmap);
         }
         costmap
     }
@@ -223,12 +268,15 @@ impl BeamModel {
         &self,
         segment: &OccupiedSegment<'_>,
         percept: &Percept<'_>,
-        free: &FreeWindow,
+        walls: &mut BeamWalls<'_>,
         costmap: &mut LocalCostmap,
     ) {
         let mut places = LocalBoxSet::default();
         let mut boxes = 0;
-        for crossed in segment.boxes.iter().filter(|one| !self.is_free(one, percept, free)) {
+        for crossed in segment.boxes {
+            if self.is_free(crossed, percept, walls) {
+                continue;
+            }
             places = places.union(crossed.places);
             boxes += 1;
         }
@@ -239,16 +287,19 @@ impl BeamModel {
 
     /// Returns whether the votes of all beams that cross a box say that it is free: one beam that has passed it decides
     /// where beams are reliable, and most of them where they are not.
-    fn is_free(&self, crossed: &BeamBox, percept: &Percept<'_>, free: &FreeWindow) -> bool {
+    fn is_free(&self, crossed: &BeamBox, percept: &Percept<'_>, walls: &mut BeamWalls<'_>) -> bool {
         let heading = usize::from(percept.heading);
         let passed = if self.are_reliable { RELIABLE_VOTES } else { 1 };
         let crossings = crossed.crossings.start as usize..crossed.crossings.end as usize;
-        let votes = self.crossings[heading][crossings].iter().map(|crossing| {
+        let mut votes = 0;
+        for crossing in &self.crossings[heading][crossings] {
             let beam = crossing.beam as usize;
-            let path = &self.beams[heading][beam];
-            path.votes(crossing.number as usize, percept.readings[beam], free, passed)
-        });
-        votes.sum::<i32>() > 0
+            let first_wall = walls.first_wall(beam);
+            let reading = percept.readings[beam];
+            let number = crossing.number as usize;
+            votes += self.beams[heading][beam].votes(number, reading, first_wall, passed);
+        }
+        votes > 0
     }
 }
 
@@ -298,7 +349,7 @@ fn beam_paths(sensor: &MountedSensor, size: u32, heading: u8, box_size_m: f64) -
             BeamBox { col: turned.dx, row: turned.dy, class, places, crossings: 0..0 }
         });
         let crossed = beam_boxes.take_while(|one| is_searched(one.col) && is_searched(one.row));
-        paths.push(BeamPath { wall, crossed: crossed.collect() });
+        paths.push(BeamPath::new(wall, crossed.collect()));
     }
     paths
 }

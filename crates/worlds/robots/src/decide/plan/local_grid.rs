@@ -23,14 +23,20 @@ pub(super) struct LocalGrid {
     pub(super) off_lane: [LocalBoxSet; 4],
     /// The places by the price of standing there, beside the step.
     pub(super) prices: [(LocalBoxSet, u16); PRICES],
-    /// Places from which the path of the static map may be followed, by how much that costs from there on, less that
-    /// of the cheapest one.
-    pub(super) exits: [LocalBoxSet; EXIT_LEVELS],
 }
 
+/// Places from which the path of the static map may be followed, by how much that costs from there on, less that of the
+/// cheapest one.
+pub(super) type Exits = [LocalBoxSet; EXIT_LEVELS];
+
 impl LocalGrid {
-    /// Returns the grid around a robot; none where no path leads out of it.
-    pub(super) fn new(view: &LocalView<'_>, prices: StepCosts) -> Option<Self> {
+    /// Returns the grid around a robot, and writes its exits, which are too large to be returned; none where no path leads
+    /// out of it.
+    pub(super) fn new(
+        view: &LocalView<'_>,
+        prices: StepCosts,
+        into_exits: &mut Exits,
+    ) -> Option<Self> {
         // Places on a grid of less than 2^31 boxes a side; some lie outside of it.
         let west = view.at.0 as i32 - PLAN_RADIUS_BOXES;
         let south = view.at.1 as i32 - PLAN_RADIUS_BOXES;
@@ -43,8 +49,8 @@ impl LocalGrid {
             }
         });
         let open = LocalBoxSet::from_rows(|row| flow.reaching_goal(row));
-        let exits = exits(view, &flow, open)?;
-        Some(Self { open, off_lane, prices: place_prices(view, prices), exits })
+        let has_exit = write_exits(view, &flow, open, into_exits);
+        has_exit.then(|| Self { open, off_lane, prices: place_prices(view, prices) })
     }
 
     /// Returns the price of standing in a place of the square, beside the step.
@@ -69,13 +75,15 @@ fn place_prices(view: &LocalView<'_>, prices: StepCosts) -> [(LocalBoxSet, u16);
     ]
 }
 
-/// Returns the places from which the static map's path may be followed: goals, and those where it leads out of the
-/// planned square, or along its edge. Where it leads back in, it may lead to the same obstacle again.
-fn exits(
+/// Writes the places from which the static map's path may be followed: goals, and those where it leads out of the
+/// planned square, or along its edge. Where it leads back in, it may lead to the same obstacle again. Returns whether there
+/// are any.
+fn write_exits(
     view: &LocalView<'_>,
     flow: &FlowWindow<SIDE>,
     open: LocalBoxSet,
-) -> Option<[LocalBoxSet; EXIT_LEVELS]> {
+    exits: &mut Exits,
+) -> bool {
     let mut found = LocalBoxSet::from_rows(|row| flow.goals(row));
     let on_edge = LocalBoxSet::EDGE.intersection(open).without(found);
     for (number, (col, row)) in on_edge.numbered_places() {
@@ -92,12 +100,12 @@ fn exits(
         rises[number] = rise;
         least = least.min(rise);
     }
-    let mut exits = [LocalBoxSet::default(); EXIT_LEVELS];
+    *exits = [LocalBoxSet::default(); EXIT_LEVELS];
     for number in found.numbers() {
         let level = (rises[number] - least) as usize;
         exits[level.min(EXIT_LEVELS - 1)].insert_number(number);
     }
-    (!found.is_empty()).then_some(exits)
+    !found.is_empty()
 }
 
 /// Returns whether the static map's path leads from a place at the edge out of the square, or along its edge.
