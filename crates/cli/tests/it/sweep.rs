@@ -334,3 +334,26 @@ fn a_wrong_baseline_is_answered_with_what_there_is() {
     assert!(twice.code() == 2 && twice.err().contains("is there twice"), "{}", twice.err());
     assert!(!place.path("d").exists());
 }
+
+#[test]
+fn variants_whose_planner_knows_all_places_are_marked_as_privileged_in_tables_and_figures() {
+    let place = TestFolder::new();
+    let hall = "format = 1\nworld = \"robots\"\ncycles = 60\nmap.ascii = \"\"\"\n........\n........\n\"\"\"\n\
+                [robots]\ncount = 4\nbehaviour = { kind = \"shuttle\", a = [0, 0, 1, 2], b = [7, 0, 1, 2] }\n";
+    place.write("hall.toml", hall);
+    let sweep = "format = 1\nscenario = \"hall.toml\"\nreplicates = 2\nmetrics = [\"trips\"]\n\
+                 [[variant]]\nname = \"alone\"\n\
+                 [[variant]]\nname = \"all places\"\nrobots.planner = { method = \"pibt\" }\n\
+                 [[variant]]\nname = \"reports\"\n\
+                 robots.planner = { method = \"pibt\", places = \"believed\", report_every = 3 }\n";
+    place.write("s.sweep.toml", sweep);
+    place.json(&["sweep", "s.sweep.toml", "--out", "s"]);
+    let report = place.run(&["report", "s"]);
+    assert_eq!(report.code(), 0, "{}", report.err());
+    let markdown = place.read("s/report.md");
+    let note = "Variants with \\* (all places \\*) are privileged, a bound rather than an equal of others: a planner knows \
+                the true places of all bodies, and who is late.";
+    assert!(markdown.matches(note).count() > 1, "below the table and the figure: {markdown}");
+    assert!(markdown.contains("| all places \\* |"), "{markdown}");
+    assert!(!markdown.contains("reports \\*") && !markdown.contains("alone \\*"), "{markdown}");
+}

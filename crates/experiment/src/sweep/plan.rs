@@ -191,7 +191,7 @@ impl Plan {
             names.retain(|name| name.ends_with(PRIVILEGE_MARK));
             names.truncate(MAX_PRIVILEGED_NAMES);
             let more = if privileged.len() > names.len() { ", and others" } else { "" };
-            format!("Variants with `*` ({}{more}) are", names.join("; "))
+            format!("Variants with * ({}{more}) are", names.join("; "))
         };
         Some(format!("{which} privileged, a bound rather than an equal of others: {reasons}."))
     }
@@ -393,7 +393,7 @@ mod tests {
         }
         assert_eq!(plan.names(), ["n=0", "n=1 *", "n=2 *"]);
         let note = plan.privilege_note().expect("some are");
-        assert!(note.starts_with("Variants with `*` (n=1 *; n=2 *) are privileged"), "{note}");
+        assert!(note.starts_with("Variants with * (n=1 *; n=2 *) are privileged"), "{note}");
         assert!(note.ends_with("others: a planner knows all."), "{note}");
         plan.variants[0].privilege = Some("a planner knows all".into());
         assert_eq!(plan.names(), ["n=0", "n=1", "n=2"]);

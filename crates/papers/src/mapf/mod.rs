@@ -238,7 +238,10 @@ impl MapResults {
         let figure =
             Figure { kind: FigureKind::Bars { categories }, ..figure(&title, labels, series) };
         let figure = figure.with_interval_note();
-        let note = format!("{} `*`: privileged, the planner knows all true places.", figure.note);
+        let note = format!(
+            "{} * marks privileged methods: the planner knows all true places.",
+            figure.note
+        );
         Figure { note, ..figure }
     }
 }
