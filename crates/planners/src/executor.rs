@@ -1,7 +1,7 @@
 //! Carrying out a plan by agents that may be late, or slip: which action each does next, and when a plan has to be made
 //! anew.
 //!
-//! An executor sees where the agents truly are before each step. What it knows of a plan is an [`Execution`], all of
+//! An executor is told where the agents are before each step. What it knows of a plan is an [`Execution`], all of
 //! which can be kept and taken up again.
 
 use crate::dependency_graph::DependencyGraph;
@@ -41,6 +41,8 @@ pub struct Execution {
     pub step: u32,
     /// Actions that each agent has done, waits aside; only [`Executor::Adg`] counts them.
     pub progress: Vec<u32>,
+    /// The most actions that each agent had done at any time: more than `progress` where one has turned out to be behind.
+    pub furthest: Vec<u32>,
     /// Steps since an agent has last made progress.
     pub stall_steps: u32,
 }
@@ -64,7 +66,7 @@ impl Execution {
     /// Creates what is known of a plan before its first step.
     pub fn new(plan: Plan) -> Self {
         let progress = vec![0; plan.agents()];
-        Self { plan, step: 0, progress, stall_steps: 0 }
+        Self { plan, step: 0, furthest: progress.clone(), progress, stall_steps: 0 }
     }
 
     /// Takes in where the agents have come to with the last step. Returns whether the plan can go on.
@@ -86,7 +88,11 @@ impl Execution {
             let done = *progress as usize;
             if graph.action(agent, done).is_some_and(|(_, after)| after == pose) {
                 *progress += 1;
-                self.stall_steps = 0;
+                // What is done again is no progress, or a plan that something stands in the way of would never end.
+                if *progress > self.furthest[agent] {
+                    self.furthest[agent] = *progress;
+                    self.stall_steps = 0;
+                }
                 continue;
             }
             let pose_after = |done: usize| match done.checked_sub(1) {
@@ -141,7 +147,8 @@ impl Execution {
         path
     }
 
-    /// Returns the agents, by rising number, that have to do an action before an agent may do its next one.
+    /// Returns the agents, by rising number, that have to do an action before an agent may do its next one, or together with
+    /// it and cannot yet.
     pub(crate) fn agents_before(&self, by: &Execute<'_>, agent: usize) -> Vec<usize> {
         let index = self.progress[agent] as usize;
         if by.executor != Executor::Adg || index >= by.graph.actions(agent) {
@@ -150,6 +157,13 @@ impl Execution {
         let is_open = |&(other, action): &(usize, usize)| self.progress[other] as usize <= action;
         let open = by.graph.dependencies(agent, index).filter(is_open);
         let mut others: Vec<usize> = open.map(|(other, _)| other).collect();
+        if let Some((number, circle)) = by.graph.circle(agent, index) {
+            let is_elsewhere = |&other: &usize| {
+                let next = self.progress[other] as usize;
+                by.graph.circle(other, next).is_none_or(|(other_number, _)| other_number != number)
+            };
+            others.extend(circle.iter().map(|&other| other as usize).filter(is_elsewhere));
+        }
         others.sort_unstable();
         others.dedup();
         others

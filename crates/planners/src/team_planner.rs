@@ -218,18 +218,25 @@ impl TeamPlanner {
     /// Returns the poses that a plan still has for an agent after [`Self::step`], from the present one on; none without a
     /// plan.
     pub fn path_ahead(&self, state: &TeamPlannerState, agent: usize) -> Vec<GridPose> {
-        let (Some(execution), Some(graph)) = (&state.execution, &state.graph) else {
-            return Vec::new();
-        };
-        execution.path_ahead(&self.execute(graph), agent)
+        let Some(execution) = &state.execution else { return Vec::new() };
+        let Some(graph) = self.kept_graph(state, execution) else { return Vec::new() };
+        execution.path_ahead(&self.execute(&graph), agent)
     }
 
     /// Returns the agents for which an agent waits by the order of its plan, by rising number.
     pub fn agents_before(&self, state: &TeamPlannerState, agent: usize) -> Vec<usize> {
-        let (Some(execution), Some(graph)) = (&state.execution, &state.graph) else {
-            return Vec::new();
-        };
-        execution.agents_before(&self.execute(graph), agent)
+        let Some(execution) = &state.execution else { return Vec::new() };
+        let Some(graph) = self.kept_graph(state, execution) else { return Vec::new() };
+        execution.agents_before(&self.execute(&graph), agent)
+    }
+
+    /// Returns the order of the actions of the present plan: after a restore it is not kept yet.
+    fn kept_graph(
+        &self,
+        state: &TeamPlannerState,
+        execution: &Execution,
+    ) -> Option<Arc<DependencyGraph>> {
+        state.graph.clone().or_else(|| self.graph_of(&execution.plan).map(Arc::new))
     }
 
     /// Drops the plan if it cannot go on or its time is over, and makes another one if it is time for that.
@@ -314,8 +321,7 @@ impl TeamPlanner {
     pub fn actions_left(&self, state: &TeamPlannerState, poses: &[GridPose]) -> Vec<usize> {
         let none = vec![0; poses.len()];
         let Some(mut execution) = state.execution.clone() else { return none };
-        let graph = state.graph.clone().or_else(|| self.graph_of(&execution.plan).map(Arc::new));
-        let Some(graph) = graph else { return none };
+        let Some(graph) = self.kept_graph(state, &execution) else { return none };
         let by = self.execute(&graph);
         if !execution.advance(&by, poses) {
             return none;

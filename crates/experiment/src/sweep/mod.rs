@@ -63,7 +63,7 @@ pub use groups::{Level, Parameter};
 pub use label::Label;
 pub use options::{BaselineChoice, SummaryOptions};
 pub use overrides::SweepOverrides;
-pub use plan::{Plan, Shard, Trial};
+pub use plan::{PRIVILEGE_MARK, Plan, Shard, Trial};
 pub use rows::RunTableBuilder;
 pub use summary::{OmittedMetric, Summary};
 pub use table::{Role, RunColumn, RunTable};

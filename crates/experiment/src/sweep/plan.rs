@@ -49,8 +49,8 @@ pub struct Plan {
 const MAX_SWEEP_RUNS: u64 = 10_000_000;
 
 /// The end of the name of a variant in which somebody knows what no agent could.
-const PRIVILEGE_MARK: &str = " *";
-/// Most variants that the note on these names.
+pub const PRIVILEGE_MARK: &str = " *";
+/// Most variants that the note on privileged ones lists by name.
 const MAX_PRIVILEGED_NAMES: usize = 6;
 
 impl Serialize for Plan {
@@ -160,6 +160,7 @@ impl Plan {
         for name in names.iter_mut().filter(|name| name.is_empty()) {
             *name = unchanged.into();
         }
+        number_duplicates(&mut names);
         // Where all are, there is nothing to tell apart.
         let has_equals = self.variants.iter().any(|variant| variant.privilege.is_none());
         for (name, variant) in names.iter_mut().zip(&self.variants) {
@@ -167,7 +168,6 @@ impl Plan {
                 name.push_str(PRIVILEGE_MARK);
             }
         }
-        number_duplicates(&mut names);
         names
     }
 
@@ -187,9 +187,10 @@ impl Plan {
             "All variants are".into()
         } else {
             // In figures by parameter no name of a variant is seen.
-            let mut names = self.names();
-            names.retain(|name| name.ends_with(PRIVILEGE_MARK));
-            names.truncate(MAX_PRIVILEGED_NAMES);
+            let names = self.names().into_iter().zip(&self.variants);
+            let marked = names.filter(|(_, variant)| variant.privilege.is_some());
+            let names: Vec<String> =
+                marked.map(|(name, _)| name).take(MAX_PRIVILEGED_NAMES).collect();
             let more = if privileged.len() > names.len() { ", and others" } else { "" };
             format!("Variants with * ({}{more}) are", names.join("; "))
         };

@@ -14,6 +14,7 @@ use crate::case_results::{
 use crate::claims::ReportParts;
 use crate::study::{Progress, Study, setting_number, sub_progress};
 use serde::Serialize;
+use sidestep::experiment::sweep::PRIVILEGE_MARK;
 use sidestep::kernel::InputError;
 use sidestep::kernel::workers::available_workers;
 use sidestep_document::claim::{Claim, verdict_summary};
@@ -87,9 +88,6 @@ const ALONE: &str = "alone";
 const ALONE_WITH_ERRORS: &str = "alone, sensors err";
 const PIBT: &str = "pibt";
 const PIBT_BY_REPORTS: &str = "pibt, reports";
-
-/// The mark of methods whose planner knows what no robot could.
-const PRIVILEGE_MARK: &str = " *";
 
 /// The name of throughput in results by seed.
 const THROUGHPUT: &str = "trips_in_1000_robot_cycles";

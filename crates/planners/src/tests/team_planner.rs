@@ -251,3 +251,22 @@ fn an_ordered_plan_that_collides_or_leaves_the_map_is_a_failure_and_all_wait() {
         assert_eq!((team.state.counts.plans, team.state.counts.failures), (1, 1), "{wrong:?}");
     }
 }
+
+#[test]
+fn an_agent_that_turns_out_to_be_behind_does_again_what_it_has_not_done_where_poses_are_beliefs() {
+    for may_fall_back in [true, false] {
+        let config = TeamPlannerConfig { may_fall_back, ..config(Method::Ordered, Executor::Adg) };
+        let mut team = Team::new(&lane(), config);
+        team.state.ordered = Some(vec![vec![Action::Forward; 4], vec![]]);
+        team.step(|_| false);
+        team.step(|_| false);
+        // It was taken to be at column 3, and reports that it is still at 1.
+        team.poses[0].col = 1;
+        let left = team.planner.actions_left(&team.state, &team.poses);
+        assert_eq!(left, if may_fall_back { [4, 0] } else { [0, 0] });
+        for _ in 0..6 {
+            team.step(|_| false);
+        }
+        assert_eq!(team.poses[0].col, if may_fall_back { 5 } else { 1 });
+    }
+}

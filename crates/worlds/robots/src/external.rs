@@ -170,7 +170,7 @@ impl RobotsWorld {
             }
             Some(TeamOrders::Plans { actions: length }) => {
                 let standard = choice(STANDARD_ACTIONS);
-                let meaning = "its actions in the plan of its team, from the next cycle on";
+                let meaning = "its actions in the plan of its team, from its next turn on";
                 return vec![
                     ValueSpace::new(PLAN, standard, meaning).with_shape([length as usize]),
                 ];
@@ -200,12 +200,25 @@ impl RobotsWorld {
                 let actions = values.iter().map(|&value| action_of_order(value as u8)).collect();
                 state.planner_teams[team].order_plan(robot, actions);
             }
-            (Some(TeamOrders::Actions), &[value]) => Avoidance::order(memory, value as ActionId),
+            (Some(TeamOrders::Actions), &[value]) => {
+                self.order_action(state, order.agent, value as ActionId);
+            }
             (None, &[value]) => {
                 let space = &self.teams.as_slice()[order.team].action_spaces[order.space];
                 External::record_order(memory, &space.name, value as u64);
             }
             _ => {}
+        }
+    }
+
+    /// Records an action that a caller orders for a robot of a team: for the robot itself, or where robots report, for the
+    /// planner, which hands it out when it believes that the robot can act.
+    fn order_action(&self, state: &RobotsState, id: EntityId, action: ActionId) {
+        let team = place_in_team(self, id);
+        let reporting = team.filter(|&(team, _)| self.planner_teams[team].leader.reports.is_some());
+        match reporting {
+            Some((team, robot)) => state.planner_teams[team].order_action(robot, action),
+            None => Avoidance::order(&state.body(id).memory, action),
         }
     }
 
@@ -228,7 +241,7 @@ impl RobotsWorld {
     }
 
     /// Writes what a planner knows of a team that it leads from outside: goals and who is busy into the last buffers, and
-    /// where robots report, what it believes over their own places and headings.
+    /// where robots report, what it believes over their own places, headings, contacts and turns.
     fn observe_goals(
         &self,
         state: &RobotsState,
@@ -270,6 +283,13 @@ impl RobotsWorld {
                     let GridPose { col, row: map_row, heading } = known.poses[robot];
                     set_boxes(&mut percepts[2], row, [col, map_row].map(i64::from));
                     percepts[3].set_integer(row, i64::from(heading));
+                    let is_due = self.bodies[id as usize].is_due(now) && busy_cycles[robot] == 0;
+                    percepts[4].set_integer(row, i64::from(is_due));
+                    // What it ran against, it tells in a report.
+                    if !known.is_known[robot] {
+                        percepts[0].set_integer(row, 0);
+                        percepts[1].set_integer(row, 0);
+                    }
                 }
             }
         }

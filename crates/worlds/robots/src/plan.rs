@@ -6,6 +6,7 @@
 
 use super::effector::{FORWARD, LEFT, RIGHT, STAY};
 use super::perceive::memory_of;
+use super::reports::Knowledge;
 use super::state::BodyRecord;
 use super::state::RobotsState;
 use super::team::{Team, TeamOrders, TeamState};
@@ -28,9 +29,17 @@ pub(crate) struct TeamSituation {
     pub(crate) is_known: Vec<bool>,
     /// Actions left of the plan of each robot of a team whose plans a caller orders.
     pub(crate) actions_left: Vec<usize>,
+    /// The places where robots are believed to stand, and those that they leave, where actions take several cycles.
+    pub(crate) held: BTreeSet<(u32, u32)>,
 }
 
 impl TeamSituation {
+    /// Returns why a robot cannot act; none for one that can.
+    pub(crate) fn busy_agent(&self, robot: usize) -> Option<&BusyAgent> {
+        let place = self.busy.binary_search_by_key(&(robot as u32), |busy| busy.agent).ok()?;
+        Some(&self.busy[place])
+    }
+
     /// Returns the robots as those who carry tasks out. Whether one has come to a place is known by its reports only.
     fn couriers(&self) -> Vec<Courier> {
         let robots = self.poses.iter().zip(&self.is_known);
@@ -75,7 +84,7 @@ impl RobotsWorld {
         let memory = &mut *guard;
         let truth = self.situation(state, team);
         memory.compare(&truth.poses);
-        let mut situation = self.known_situation(team, memory, truth, now);
+        let mut situation = self.known_situation(team, memory.knowledge(), truth, now);
         let errands = self.errands(state, team, team_state, &situation.couriers());
         let last = &memory.planner.pibt.goals;
         let choose = || self.choose_goals(state, team, &situation.is_known, last);
@@ -90,16 +99,27 @@ impl RobotsWorld {
         let actions = planner.step(&mut memory.planner, now);
         let actions = actions.expect("goals are boxes where the body fits");
         for (robot, (id, &action)) in team.robots.clone().zip(actions).enumerate() {
-            let waits = action == Action::Forward && self.must_wait(state, team, id);
+            let waits = action == Action::Forward && self.must_wait(state, team, &situation, id);
             let action = if waits { Action::Wait } else { action };
             memory.planned[robot] = poses[robot].after(action);
             decide::Avoidance::order(&state.body(id).memory, action_id(action));
         }
     }
 
-    /// Returns whether a planner that sees all lets a robot wait before a box that is still held.
-    fn must_wait(&self, state: &RobotsState, team: &Team, id: EntityId) -> bool {
-        team.leader.reports.is_none() && self.is_kept_out(state, id)
+    /// Returns whether a robot has to wait before a box that is still held, as far as its planner knows.
+    fn must_wait(
+        &self,
+        state: &RobotsState,
+        team: &Team,
+        situation: &TeamSituation,
+        id: EntityId,
+    ) -> bool {
+        if team.leader.reports.is_none() {
+            return self.is_kept_out(state, id);
+        }
+        let pose = situation.poses[(id - team.robots.start) as usize];
+        let Some(next) = pose.after(Action::Forward) else { return false };
+        meets(&situation.held, next.position(), self.type_of(id).size.0, Some(pose.position()))
     }
 
     /// Notes where the actions lead that a caller has ordered for a team.
@@ -110,21 +130,29 @@ impl RobotsWorld {
         memory: &mut TeamMemory,
         situation: &TeamSituation,
     ) {
-        let TeamSituation { poses, busy, .. } = situation;
-        for (robot, id) in (0..).zip(team.robots.clone()) {
-            let pose = poses[robot as usize];
+        for (robot, id) in team.robots.clone().enumerate() {
+            let pose = situation.poses[robot];
             // Its order stands until it can act.
-            if busy.binary_search_by_key(&robot, |busy| busy.agent).is_ok() {
-                memory.planned[robot as usize] = Some(pose);
+            if situation.busy_agent(robot).is_some() {
+                memory.planned[robot] = Some(pose);
                 continue;
             }
             let order = &state.body(id).memory;
+            if let Some(belief) = memory.beliefs.robots.get_mut(robot) {
+                // An order that it did not carry out, because it was late, is gone: the planner takes it that it did.
+                let action = std::mem::take(&mut belief.order).checked_sub(1);
+                decide::Avoidance::order(
+                    order,
+                    action.map_or(STAY, |action| action as decide::ActionId),
+                );
+            }
             // As those that a planner leads.
-            if decide::Avoidance::ordered(order) == FORWARD && self.must_wait(state, team, id) {
+            let is_forward = decide::Avoidance::ordered(order) == FORWARD;
+            if is_forward && self.must_wait(state, team, situation, id) {
                 decide::Avoidance::order(order, STAY);
             }
             let action = planned_action(decide::Avoidance::ordered(order));
-            memory.planned[robot as usize] = action.and_then(|action| pose.after(action));
+            memory.planned[robot] = action.and_then(|action| pose.after(action));
         }
     }
 
@@ -137,9 +165,11 @@ impl RobotsWorld {
         now: Cycle,
     ) -> TeamSituation {
         let (planner, memory) = team_state.locked();
-        let mut memory = memory.clone();
-        let mut situation =
-            self.known_situation(team, &mut memory, self.situation(state, team), now);
+        let mut beliefs = memory.beliefs.clone();
+        let step = memory.planner.pibt.step;
+        let knowledge = Knowledge { beliefs: &mut beliefs, planned: &memory.planned, step };
+        let truth = self.situation(state, team);
+        let mut situation = self.known_situation(team, knowledge, truth, now);
         situation.actions_left = planner.actions_left(&memory.planner, &situation.poses);
         let errands = self.errands_ahead(team_state, &situation.couriers());
         let last = &memory.planner.pibt.goals;
@@ -205,7 +235,7 @@ impl RobotsWorld {
             let size = self.type_of(id).size.0;
             let at = self.map_position(state.body(id).position());
             let steps = |goal: (u32, u32)| at.0.abs_diff(goal.0) + at.1.abs_diff(goal.1);
-            let is_taken = |goal: (u32, u32)| meets(&taken, goal, size);
+            let is_taken = |goal: (u32, u32)| meets(&taken, goal, size, None);
             let nearest = anchors.iter().min_by_key(|&&goal| (is_taken(goal), steps(goal)));
             goals[robot] = nearest.copied();
             taken.extend(nearest);
@@ -268,12 +298,22 @@ pub(crate) fn place_in_team(world: &RobotsWorld, id: EntityId) -> Option<(usize,
     Some((team, (id - world.planner_teams[team].robots.start) as usize))
 }
 
-/// Returns whether a body at one place covers a box that one of the same size at another place does.
-fn meets(taken: &BTreeSet<(u32, u32)>, (col, row): (u32, u32), size: u32) -> bool {
+/// Returns whether a body at a place covers a box that one of the same size does at another one, its own left out.
+fn meets(
+    taken: &BTreeSet<(u32, u32)>,
+    (col, row): (u32, u32),
+    size: u32,
+    own: Option<(u32, u32)>,
+) -> bool {
     let reach = size - 1;
     let rows = row.saturating_sub(reach)..=row + reach;
-    let cols = col.saturating_sub(reach)..=col + reach;
-    taken.iter().any(|(other_col, other_row)| cols.contains(other_col) && rows.contains(other_row))
+    for other_col in col.saturating_sub(reach)..=col + reach {
+        let in_col = taken.range((other_col, *rows.start())..=(other_col, *rows.end()));
+        if in_col.into_iter().any(|&other| Some(other) != own) {
+            return true;
+        }
+    }
+    false
 }
 
 /// Returns an action by its number among those that robots have for planners, in the order of these numbers.

@@ -1,7 +1,8 @@
 //! The teams that planners lead: their robots, and what a planner remembers of them.
 
+use crate::effector::ActionId;
 use crate::errand_fields::ErrandFields;
-use crate::reports::{Belief, Reports};
+use crate::reports::{Beliefs, Reports};
 use crate::team_memory::TeamMemory;
 use crate::team_words;
 use sidestep_kernel::{EntityId, Seed};
@@ -89,8 +90,7 @@ impl TeamState {
             planner: TeamPlannerState::new(robots),
             planned: vec![None; robots],
             off_plan: vec![0; robots],
-            beliefs: vec![Belief::default(); if has_reports { robots } else { 0 }],
-            has_reported: vec![false; robots],
+            beliefs: Beliefs::new(if has_reports { robots } else { 0 }),
         };
         let planner = Arc::new(Mutex::new(planner));
         Self { planner, is_stepwise, memory: Mutex::new(memory), tasks: None, errand_fields: None }
@@ -141,6 +141,11 @@ impl TeamState {
         let (_, place) = self.errand(robot)?;
         let fields = self.errand_fields.as_ref()?;
         Some(lock(fields).to_errand(place))
+    }
+
+    /// Records the action that a caller orders for a robot that reports: it gets it when it is believed to be free.
+    pub(crate) fn order_action(&self, robot: usize, action: ActionId) {
+        lock(&self.memory).beliefs.robots[robot].order = u32::from(action) + 1;
     }
 
     /// Records the actions of a plan that a caller orders for a robot; the others wait, unless they are ordered, too.

@@ -1,6 +1,6 @@
 //! What the planner of a team remembers from cycle to cycle.
 
-use crate::reports::Belief;
+use crate::reports::{Beliefs, Knowledge};
 use sidestep_planners::{GridPose, TeamPlannerState};
 
 /// All that the planner of a team remembers.
@@ -11,13 +11,17 @@ pub(crate) struct TeamMemory {
     pub(crate) planned: Vec<Option<GridPose>>,
     /// Times that each robot was elsewhere than planned.
     pub(crate) off_plan: Vec<u32>,
-    /// What is believed of each robot; empty for a planner that knows all that is true.
-    pub(crate) beliefs: Vec<Belief>,
-    /// Whether each robot has reported in the present cycle; no state, because it is set anew in each one.
-    pub(crate) has_reported: Vec<bool>,
+    /// What is believed of the robots.
+    pub(crate) beliefs: Beliefs,
 }
 
 impl TeamMemory {
+    /// Returns what the planner believed at its last turn.
+    pub(crate) fn knowledge(&mut self) -> Knowledge<'_> {
+        let step = self.planner.pibt.step;
+        Knowledge { beliefs: &mut self.beliefs, planned: &self.planned, step }
+    }
+
     /// Counts the robots that are elsewhere than planned.
     pub(crate) fn compare(&mut self, poses: &[GridPose]) {
         for (robot, &pose) in poses.iter().enumerate() {

@@ -3,11 +3,11 @@
 //! | words | of |
 //! |---|---|
 //! | steps without the goal, goal, planned place and heading, times off the plan | each robot |
-//! | believed place, heading, place that it leaves, cycles of its action and its delay | each robot where these report |
-//! | actions of an order and 1, or 0 without; the actions by 16 | each robot of a team that carries plans out |
+//! | believed place, heading, place that it leaves, cycles of its action and its delay, order | each robot where these report |
 //! | the first step of the next search, counts of plans | robot 0 of a team that carries plans out |
+//! | actions of an order and 1, or 0 without; the actions by 16 | each robot of a team that carries plans out |
 //! | steps of the plan so far, steps without progress | robot 0 where there is a plan |
-//! | actions done, place and heading at its start, number of actions, the actions by 16 | each robot where there is a plan |
+//! | actions done, place and heading at its start, where it reports the most actions done, number of actions, the actions by 16 | each robot where there is a plan |
 
 use crate::reports::Belief;
 use crate::team_memory::TeamMemory;
@@ -30,10 +30,10 @@ pub(crate) fn words(memory: &TeamMemory, robot: usize, is_stepwise: bool) -> Vec
         heading,
         memory.off_plan[robot],
     ];
-    if let Some(belief) = memory.beliefs.get(robot) {
-        let Belief { pose, from, steps_left, delay_steps } = *belief;
+    if let Some(belief) = memory.beliefs.robots.get(robot) {
+        let Belief { pose, from, steps_left, delay_steps, order } = *belief;
         let places = [packed(Some(pose.position())), u32::from(pose.heading), packed(Some(from))];
-        words.extend(places.into_iter().chain([steps_left, delay_steps]));
+        words.extend(places.into_iter().chain([steps_left, delay_steps, order]));
     }
     if is_stepwise {
         return words;
@@ -58,6 +58,9 @@ pub(crate) fn words(memory: &TeamMemory, robot: usize, is_stepwise: bool) -> Vec
     let path = execution.plan.path(robot);
     let start = packed(Some(path[0].position()));
     words.extend([execution.progress[robot], start, u32::from(path[0].heading)]);
+    if !memory.beliefs.robots.is_empty() {
+        words.push(execution.furthest[robot]);
+    }
     let actions = actions_of(path);
     words.push(actions.len() as u32);
     words.extend(packed_actions(&actions));
@@ -74,13 +77,13 @@ pub(crate) fn restore(memory: &mut TeamMemory, shares: &[&[u32]], is_stepwise: b
         memory.planned[robot] =
             unpacked(place).map(|(col, row)| GridPose::new(col, row, heading as u8));
         memory.off_plan[robot] = off_plan;
-        if let Some(belief) = memory.beliefs.get_mut(robot) {
-            let [place, heading, from, steps_left, delay_steps] =
-                [(); 5].map(|()| reader.next().unwrap_or(0));
+        if let Some(belief) = memory.beliefs.robots.get_mut(robot) {
+            let [place, heading, from, steps_left, delay_steps, order] =
+                [(); 6].map(|()| reader.next().unwrap_or(0));
             let (col, row) = unpacked(place).unwrap_or_default();
             let pose = GridPose::new(col, row, heading as u8);
             let from = unpacked(from).unwrap_or_default();
-            *belief = Belief { pose, from, steps_left, delay_steps };
+            *belief = Belief { pose, from, steps_left, delay_steps, order };
         }
     }
     let Some(first) = readers.first_mut().filter(|_| !is_stepwise) else { return };
@@ -89,7 +92,8 @@ pub(crate) fn restore(memory: &mut TeamMemory, shares: &[&[u32]], is_stepwise: b
     memory.planner.next_search = next_search;
     memory.planner.counts = PlanCounts { plans, failures, expansions, costs, bounds };
     memory.planner.ordered = ordered(&mut readers);
-    memory.planner.execution = execution(&mut readers);
+    let may_fall_back = !memory.beliefs.robots.is_empty();
+    memory.planner.execution = execution(&mut readers, may_fall_back);
 }
 
 /// Reads the actions of each robot that a caller has ordered; none where there are none.
@@ -102,18 +106,22 @@ fn ordered(readers: &mut [Reader<'_>]) -> Option<Vec<Vec<Action>>> {
     plan.into_iter().collect()
 }
 
-fn execution(readers: &mut [Reader<'_>]) -> Option<Execution> {
+fn execution(readers: &mut [Reader<'_>], may_fall_back: bool) -> Option<Execution> {
     let first = readers.first_mut()?;
     let step = first.next()?;
     let stall_steps = first.next()?;
     let mut progress = Vec::with_capacity(readers.len());
+    let mut furthest = Vec::with_capacity(readers.len());
     let mut paths = Vec::with_capacity(readers.len());
     for reader in readers {
-        progress.push(reader.next()?);
-        paths.push(reader.path()?);
+        let done = reader.next()?;
+        progress.push(done);
+        let start = reader.start()?;
+        furthest.push(if may_fall_back { reader.next()? } else { done });
+        paths.push(reader.path_from(start)?);
     }
     let is_even = paths.iter().all(|path| path.len() == paths[0].len());
-    is_even.then(|| Execution { plan: Plan::new(paths), step, progress, stall_steps })
+    is_even.then(|| Execution { plan: Plan::new(paths), step, progress, furthest, stall_steps })
 }
 
 /// The rest of a share.
@@ -147,9 +155,12 @@ impl Reader<'_> {
         Some(actions)
     }
 
-    fn path(&mut self) -> Option<Vec<GridPose>> {
+    fn start(&mut self) -> Option<GridPose> {
         let (col, row) = unpacked(self.next()?)?;
-        let mut pose = GridPose::new(col, row, self.next()? as u8);
+        Some(GridPose::new(col, row, self.next()? as u8))
+    }
+
+    fn path_from(&mut self, mut pose: GridPose) -> Option<Vec<GridPose>> {
         let count = self.next()? as usize;
         let mut path = vec![pose];
         for action in self.actions(count)? {

@@ -248,6 +248,19 @@ fn robot_section(section: &Value) -> Value {
         "sensors": value_or(&section["sensors"], json!([])),
         "effector": value_or(&section["effector"], "perfect".into()),
         "behaviour": value_or(&section["behaviour"]["kind"], default_behaviour.into()),
+        "planner": section["planner"].as_object().map(|_| planner_entry(&section["planner"])),
+    })
+}
+
+/// Returns who leads the robots of a section. A planner that knows the true places is privileged.
+fn planner_entry(planner: &Value) -> Value {
+    let places = value_or(&planner["places"], "true".into());
+    json!({
+        "method": planner["method"],
+        "places": places,
+        "is_privileged": places == "true",
+        "report_every": value_or(&planner["report_every"], 1.into()),
+        "report_loss": value_or(&planner["report_loss"], 0.0.into()),
     })
 }
 
@@ -348,7 +361,7 @@ fn robots_text(robots: &Value) -> String {
         n => format!(", {n} cycles an action"),
     };
     format!(
-        "{count} of {size} x {size} boxes: {sensors}, effector {}, {}, every {}{actions}",
+        "{count} of {size} x {size} boxes: {sensors}, effector {}, {}, every {}{actions}{planner}",
         unquoted(&robots["effector"]),
         unquoted(&robots["behaviour"]),
         match &robots["period"] {
@@ -356,7 +369,25 @@ fn robots_text(robots: &Value) -> String {
             n => format!("{n} cycles"),
         },
         size = robots["size_boxes"],
+        planner = planner_text(&robots["planner"]),
     )
+}
+
+/// Returns who leads robots in words, after a comma; nothing for those that decide alone.
+fn planner_text(planner: &Value) -> String {
+    if planner.is_null() {
+        return String::new();
+    }
+    let method = unquoted(&planner["method"]);
+    if planner["is_privileged"] == true {
+        return format!(", led by {method}, which knows all true places (privileged)");
+    }
+    let loss_percent = 100.0 * planner["report_loss"].as_f64().unwrap_or(0.0);
+    let every = match planner["report_every"].as_u64() {
+        Some(1) => "at each action".into(),
+        _ => format!("at one of {} actions", planner["report_every"]),
+    };
+    format!(", led by {method}, which knows their reports {every}, {loss_percent} % of them lost")
 }
 
 fn sensor_text(sensor: &Value) -> String {

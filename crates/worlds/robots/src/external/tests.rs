@@ -488,16 +488,35 @@ fn a_planner_outside_whose_robots_report_sees_them_where_they_should_be() {
     let text =
         LED.replace("\"external\"", "\"external\", places = \"believed\", report_every = 1000");
     let mut run = robots_run(&source(&text), 1).expect("it compiles");
-    // It runs against the border of the map, and is believed to go on as far as there are boxes.
+    // One order more than there are boxes as far as the border of the map.
     let order = |run: &mut RobotsRun, action: f64| {
         let order = MultiAgentOrder { order: "action", agents: &[2], values: &[action] };
         run.order(&order).expect("right");
         run.advance(1);
     };
-    for _ in 0..20 {
+    for _ in 0..12 {
         order(&mut run, 0.0);
     }
     let believed = observed(&run, 1)["at_boxes"][0];
     let is = run.world().map_position(run.state().body(2).position()).0;
-    assert!(believed > i64::from(is), "it slipped and was late: {believed}, and is at {is}");
+    assert!(is < 11, "it slipped and was late");
+    assert_eq!(believed, 11, "at the border, where its orders have led it");
+}
+
+#[test]
+fn an_order_to_a_robot_that_reports_is_believed_to_be_carried_out_once_though_it_is_late() {
+    let text = LED
+        .replace("\"external\"", "\"external\", places = \"believed\", report_every = 1000")
+        .replace("p = 0.05\nmin = 1\nmax = 5", "p = 1.0\nmin = 9\nmax = 9");
+    let mut run = robots_run(&source(&text), 1).expect("it compiles");
+    let order = MultiAgentOrder { order: "action", agents: &[2], values: &[0.0] };
+    run.order(&order).expect("right");
+    // It stands in a checkpoint, because the robot has not got it yet.
+    let mut resumed = robots_run(&source(&text), 1).expect("it compiles");
+    resumed.restore(&run.checkpoint()).expect("the same scenario");
+    for run in [&mut run, &mut resumed] {
+        run.advance(6);
+        assert_eq!(observed(run, 1)["at_boxes"][0], 1);
+        assert_eq!(run.world().map_position(run.state().body(2).position()).0, 0, "it is late");
+    }
 }

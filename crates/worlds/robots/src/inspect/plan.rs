@@ -19,6 +19,8 @@ struct TeamPlan {
     /// Robots that pass before it by the order of the plan.
     before: Vec<EntityId>,
     off_plan: u32,
+    /// Whether it is to wait in this cycle.
+    is_waiting: bool,
     /// The place where the planner believes it, if that depends on reports.
     believed: Option<(u32, u32)>,
 }
@@ -49,7 +51,10 @@ impl<T: OccupantWord> Inspector<'_, T> {
             // Where it would go if nobody were in its way.
             None => self.draw_path("way to its goal", &own_path),
         }
-        if waits_for.is_empty() {
+        let may_wait = plan.as_ref().is_none_or(|plan| plan.is_waiting);
+        if !may_wait {
+            waits_for.clear();
+        } else if waits_for.is_empty() {
             waits_for = self.cycle.world.bodies_in_way(self.present, self.id);
         }
         let mut table = FactTable::new(["waits for"]);
@@ -71,16 +76,24 @@ impl<T: OccupantWord> Inspector<'_, T> {
         let robots = &world.planner_teams[team].robots;
         let team_state: &TeamState = &self.cycle.state.planner_teams[team];
         let errand = team_state.goal_of_task(robot);
+        // Before the locks are taken, which it takes, too.
+        let known = world.situation_ahead(
+            self.present,
+            &world.planner_teams[team],
+            &self.present.planner_teams[team],
+            self.cycle.now,
+        );
         let (planner, memory) = team_state.locked();
         let mut path: Vec<(u32, u32)> = planner
             .path_ahead(&memory.planner, robot)
             .into_iter()
             .map(|pose| pose.position())
             .collect();
-        let believed = memory.beliefs.get(robot).map(|belief| belief.pose.position());
+        let pose = known.poses[robot];
+        let has_reports = world.planner_teams[team].leader.reports.is_some();
+        let believed = has_reports.then(|| pose.position());
         if path.is_empty() {
-            let place = world.map_position(self.cycle.body(self.slot).position());
-            path.push(believed.unwrap_or(place));
+            path.push(pose.position());
             path.extend(memory.planned[robot].map(|pose| pose.position()));
         }
         let before = planner.agents_before(&memory.planner, robot);
@@ -89,6 +102,7 @@ impl<T: OccupantWord> Inspector<'_, T> {
             path,
             before: before.into_iter().map(|other| robots.start + other as EntityId).collect(),
             off_plan: memory.off_plan[robot],
+            is_waiting: memory.planned[robot].is_none_or(|planned| planned == pose),
             believed,
         })
     }

@@ -198,7 +198,7 @@ fn random_problem(number: u32, size: u32) -> (FreeSpace, Vec<[(u32, u32); 2]>) {
         let robot = [(); 2].map(|()| (draws.uniform_below(side), draws.uniform_below(side)));
         let fits = |end: usize| {
             let (col, row) = robot[end];
-            anchors.is_free(col, row) && !super::meets(&taken[end], robot[end], size)
+            anchors.is_free(col, row) && !super::meets(&taken[end], robot[end], size, None)
         };
         if robots.len() < wanted && fits(0) && fits(1) {
             (0..2).for_each(|end| _ = taken[end].insert(robot[end]));

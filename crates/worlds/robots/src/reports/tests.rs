@@ -53,7 +53,7 @@ fn run(text: &str) -> RobotsRun {
 /// The column where the planner of the first team believes its first robot.
 fn believed_col(run: &RobotsRun) -> u32 {
     let (_planner, memory) = run.state().planner_teams[0].locked();
-    memory.beliefs[0].pose.col
+    memory.beliefs.robots[0].pose.col
 }
 
 /// The column where a robot is.
@@ -124,4 +124,73 @@ fn a_robot_whose_reports_are_lost_at_times_arrives_all_the_same() {
     run.advance(2_000);
     let metrics = run.metrics();
     assert!(metrics.total.trips >= 8, "{metrics:?}");
+}
+
+#[test]
+fn robots_that_act_seldom_report_at_their_turns_and_a_resumed_run_believes_the_same() {
+    let planner = "method = \"pibt\", places = \"believed\", report_every = 3, report_loss = 0.2";
+    let text = ROOMS
+        .replace("PLANNER", planner)
+        .replace("count = 8\n", "count = 8\nperiod = 3\nphase = 1\n");
+    let mut whole = run(&text);
+    whole.advance(600);
+    assert!(whole.metrics().total.trips > 0, "{:?}", whole.metrics());
+    for at in [1, 2, 3, 100, 301] {
+        let mut before = run(&text);
+        before.advance(at);
+        let mut resumed = run_in_order(&text, 2, StorageOrder::Spatial);
+        resumed.restore(&before.checkpoint()).expect("the same scenario");
+        resumed.advance(600 - at);
+        assert_eq!(resumed.digest(), whole.digest(), "resumed at {at}");
+    }
+}
+
+/// Robots that never err, in a hall.
+fn hall(robots: &str, planner: &str) -> String {
+    format!(
+        "format = 1\nworld = \"robots\"\nregime = \"reliable\"\nconflict_policy = \"simultaneous\"\nseed = 2\nmap.ascii = \"\"\"\n............\n\
+         ............\n............\n............\n\"\"\"\n[[robots]]\ncount = 6\n{robots}\
+         behaviour = {{ kind = \"shuttle\", a = [0, 0, 2, 4], b = [10, 0, 2, 4] }}\nplanner = {{ {planner} }}\n"
+    )
+}
+
+#[test]
+fn without_errors_and_reports_what_is_believed_is_true_in_each_cycle() {
+    for robots in ["", "action_cycles = 3\n", "period = 3\nphase = 1\n"] {
+        let planner = "method = \"pibt\", places = \"believed\", report_loss = 1.0";
+        let mut run = run(&hall(robots, planner));
+        for cycle in 0..60 {
+            let (world, state) = (run.world(), run.state());
+            let team = &world.planner_teams[0];
+            let known = world.situation_ahead(state, team, &state.planner_teams[0], cycle);
+            for (robot, id) in team.robots.clone().enumerate() {
+                let body = state.body(id);
+                let is = (world.map_position(body.position()), body.facing.get().heading());
+                let believed = (known.poses[robot].position(), known.poses[robot].heading);
+                assert_eq!(believed, is, "robot {id}, cycle {cycle}, {robots}");
+                let left = known.busy_agent(robot).map_or(0, |busy| busy.steps_left);
+                assert_eq!(left, state.action_progress.left(id), "robot {id}, cycle {cycle}");
+            }
+            run.advance(1);
+        }
+        assert!(run.metrics().total.distance_m > 0.0);
+    }
+}
+
+#[test]
+fn the_order_of_a_plan_keeps_robots_out_of_boxes_that_others_are_believed_to_leave() {
+    let planner = "method = \"lacam\", budget_expansions = 100, places = \"believed\"";
+    let mut run = run(&hall("action_cycles = 3\n", planner));
+    run.advance(600);
+    let total = run.metrics().total;
+    assert!(total.trips > 0, "{total:?}");
+    assert_eq!((total.contacts, total.off_plan), (0, 0), "{total:?}");
+}
+
+#[test]
+fn a_plan_that_something_unknown_stands_in_the_way_of_is_given_up_though_steps_are_believed() {
+    let text = LANE.replace("method = \"pibt\"", "method = \"lacam\", budget_expansions = 20");
+    let mut run = run(&text);
+    run.advance(200);
+    assert!(run.metrics().plans >= 3, "{:?}", run.metrics());
 }

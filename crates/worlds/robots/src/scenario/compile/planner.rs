@@ -36,6 +36,9 @@ const DEFAULT_REPLAN_EVERY: u32 = 20;
 /// Actions of a plan that a caller orders unless the scenario says otherwise: about the way through a room.
 const DEFAULT_ORDERED_ACTIONS: u32 = 20;
 
+/// Most actions of a plan that a caller orders: each order has as many numbers for each robot.
+const MAX_ORDERED_ACTIONS: u32 = 10_000;
+
 /// Most bytes of a plan: 10,000 robots with 10,000 actions each.
 const MAX_PLAN_BYTES: u64 = 100 << 20;
 
@@ -60,7 +63,11 @@ impl Compiler<'_> {
             action_steps: action_cycles(s),
             seed: Seed(0),
         };
-        Ok(Some(TeamLeader { config, orders: orders(planner), reports: reports(planner) }))
+        Ok(Some(TeamLeader {
+            config,
+            orders: orders(planner),
+            reports: reports(planner, action_cycles(s)),
+        }))
     }
 
     fn planner_method(
@@ -107,6 +114,9 @@ impl Compiler<'_> {
         let has_reports = planner.places == KnownPlaces::Believed;
         let report_every_span = planner.report_every.as_ref().map(Spanned::span);
         let report_loss_span = planner.report_loss.as_ref().map(Spanned::span);
+        let loses_all =
+            planner.report_loss.as_ref().is_some_and(|loss| f64::from(*loss.get_ref()) >= 1.0);
+        let ordered_actions = window(planner).unwrap_or(DEFAULT_ORDERED_ACTIONS);
         let file_span = planner.file.as_ref().map(Spanned::span);
         let faults = [
             (
@@ -120,9 +130,13 @@ impl Compiler<'_> {
                 "give executor = \"adg\" or \"blind\"",
             ),
             (
-                window_span.filter(|_| is_stepwise || is_given),
-                "`window` has no effect: only `lacam`, `prioritized`, `cbs` and `external` with an executor plan in \
-                 windows",
+                window_span.clone().filter(|_| is_external && is_stepwise),
+                "`window` has no effect on a program that orders action by action",
+                "leave out `window`, or add executor = \"adg\": then it orders plans of up to so many actions",
+            ),
+            (
+                window_span.clone().filter(|_| is_stepwise || is_given),
+                "`window` has no effect: only `lacam`, `prioritized` and `cbs` plan in windows",
                 "leave out `window`",
             ),
             (
@@ -146,14 +160,24 @@ impl Compiler<'_> {
                 "leave it out, or give method = \"file\"",
             ),
             (
+                report_every_span.clone().filter(|_| loses_all),
+                "`report_every` has no effect where all reports are lost",
+                "leave it out, or give report_loss below 1",
+            ),
+            (
+                window_span.filter(|_| is_external && ordered_actions > MAX_ORDERED_ACTIONS),
+                "a plan that a program orders has at most 10,000 actions",
+                "give window = 20, or another number up to 10000",
+            ),
+            (
                 report_every_span.filter(|_| !has_reports),
                 "`report_every` has no effect on a planner that knows the true places",
-                "leave it out, or add places = \"believed\"",
+                "leave it out, or give places = \"believed\"",
             ),
             (
                 report_loss_span.filter(|_| !has_reports),
                 "`report_loss` has no effect on a planner that knows the true places",
-                "leave it out, or add places = \"believed\"",
+                "leave it out, or give places = \"believed\"",
             ),
         ];
         for (span, cause, remedy) in faults {
@@ -293,11 +317,12 @@ fn orders(planner: &PlannerSection) -> Option<TeamOrders> {
 }
 
 /// Returns how robots report to a planner that does not know the true places.
-fn reports(planner: &PlannerSection) -> Option<Reports> {
+fn reports(planner: &PlannerSection, action_cycles: u32) -> Option<Reports> {
     let every = planner.report_every.as_ref();
     let loss = planner.report_loss.as_ref();
     (planner.places == KnownPlaces::Believed).then(|| Reports {
-        every_steps: every.map_or(1, |every| every.get_ref().get() as u32),
+        // Where an action takes several cycles, the planner has a turn in each of these.
+        every_steps: every.map_or(1, |every| every.get_ref().get() * u64::from(action_cycles)),
         loss: Bernoulli::new(loss.map_or(0.0, |loss| f64::from(*loss.get_ref()))),
     })
 }
