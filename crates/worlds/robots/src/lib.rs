@@ -20,6 +20,7 @@ mod alias_table;
 mod auction;
 mod audit;
 pub mod baseline;
+mod belief;
 mod broadcast;
 mod bundle;
 mod calibration_rows;
@@ -58,6 +59,7 @@ mod table_notes;
 mod team;
 mod team_delays;
 mod team_memory;
+mod team_situation;
 mod team_words;
 #[cfg(test)]
 mod test_runs;

@@ -1,8 +1,8 @@
 //! The teams that planners lead: their robots, and what a planner remembers of them.
 
+use crate::belief::{Beliefs, Reports};
 use crate::effector::ActionId;
 use crate::errand_fields::ErrandFields;
-use crate::reports::{Beliefs, Reports};
 use crate::team_memory::TeamMemory;
 use crate::team_words;
 use sidestep_kernel::{EntityId, Seed};

@@ -1,6 +1,6 @@
 //! What the planner of a team remembers from cycle to cycle.
 
-use crate::reports::{Beliefs, Knowledge};
+use crate::belief::{Beliefs, Knowledge};
 use sidestep_planners::{GridPose, TeamPlannerState};
 
 /// All that the planner of a team remembers.

@@ -9,7 +9,7 @@
 //! | steps of the plan so far, steps without progress | robot 0 where there is a plan |
 //! | actions done, place and heading at its start, where it reports the most actions done, number of actions, the actions by 16 | each robot where there is a plan |
 
-use crate::reports::Belief;
+use crate::belief::Belief;
 use crate::team_memory::TeamMemory;
 use sidestep_planners::{Action, Execution, GridPose, Plan, PlanCounts};
 

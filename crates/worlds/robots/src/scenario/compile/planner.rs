@@ -6,8 +6,8 @@ use super::super::{
 use super::bodies::{BodyGroup, action_cycles, period_cycles};
 use super::robots::side_boxes;
 use super::*;
+use crate::belief::Reports;
 use crate::effector::{LEFT, RIGHT, STANDARD_ACTIONS, STAY, Side};
-use crate::reports::Reports;
 use crate::team::{TeamLeader, TeamOrders};
 use sidestep_kernel::Seed;
 use sidestep_kernel::distr::Bernoulli;
