@@ -136,10 +136,15 @@ impl Study {
         what: &str,
         progress: &mut Progress<'_>,
     ) -> Result<StudyResults, InputError> {
-        self.run_by(workers, what, progress, |scenario, _, trial| {
+        let mut results = self.run_by(workers, what, progress, |scenario, _, trial| {
             let run = start_trial(&WORLDS, *trial, &scenario()?, 1)?;
             Ok(run.run(&|| true).expect("nobody stops it"))
-        })
+        })?;
+        for variant in &mut results.variants {
+            let compiled = WORLDS.compile(&self.scenario_with(&variant.settings)?)?;
+            variant.privilege = compiled.privilege().map(String::from);
+        }
+        Ok(results)
     }
 
     /// Returns the scenario with settings that a case and its seed give, in place of those of its variant.
