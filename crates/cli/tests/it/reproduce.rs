@@ -100,7 +100,7 @@ fn a_rehearsal_of_the_airspace_experiments_measures_over_sockets_or_says_how_to(
 fn a_rehearsal_of_the_study_of_planners_leaves_a_whole_report() {
     let place = TestFolder::new();
     let told = place.json(&["reproduce", "mapf", "--quick", "--seeds", "1", "--out", "m"]);
-    assert_eq!(told["claims"].as_array().map(Vec::len), Some(7));
+    assert_eq!(told["claims"].as_array().map(Vec::len), Some(8));
     assert_eq!(names(&place.path("m")), WHOLE);
     let report = place.read("m/report.md");
     assert!(report.contains("A rehearsal") && !report.contains("NaN"), "{report}");
