@@ -68,10 +68,11 @@ impl RobotsWorld {
         events
     }
 
-    /// Returns the number of cycles after which a robot may be in a gridlock. One that acts seldom has as many actions
-    /// as others to come nearer.
+    /// Returns the number of cycles after which a robot may be in a gridlock. One that acts seldom, or slowly, has as many
+    /// actions as others to come nearer.
     fn stall_cycles(&self, id: EntityId) -> Cycle {
-        STALL_CYCLES * u64::from(self.bodies[id as usize].period)
+        let body = &self.bodies[id as usize];
+        STALL_CYCLES * u64::from(body.period) * u64::from(body.action_cycles)
     }
 
     /// Returns some robots, with those that were in their way lately.
