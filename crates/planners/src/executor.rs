@@ -114,7 +114,10 @@ impl Execution {
 
     /// Returns whether nobody has made progress for too long. Whoever has no action left cannot make any.
     pub(crate) fn is_stalled(&self, by: &Execute<'_>) -> bool {
-        let max_stall_steps = MAX_STALL_ACTIONS.saturating_mul(by.action_steps.max(1));
+        // An agent that is behind needs its time to get to where it was taken to be.
+        let behind = self.furthest.iter().zip(&self.progress);
+        let behind = behind.map(|(&furthest, &progress)| furthest - progress).max().unwrap_or(0);
+        let max_stall_steps = (MAX_STALL_ACTIONS + behind).saturating_mul(by.action_steps.max(1));
         self.stall_steps >= max_stall_steps && !self.is_complete(by.graph)
     }
 

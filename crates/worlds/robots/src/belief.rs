@@ -1,5 +1,6 @@
 //! What a planner believes of robots that report: that its orders are carried out.
 
+use crate::effector::ActionId;
 use sidestep_kernel::distr::Bernoulli;
 use sidestep_planners::{BusyAgent, GridPose};
 
@@ -33,8 +34,8 @@ pub(crate) struct Belief {
     pub(crate) steps_left: u32,
     /// Cycles of delay left.
     pub(crate) delay_steps: u32,
-    /// The action that a caller has ordered and the robot has not got yet, and 1; 0 without.
-    pub(crate) order: u32,
+    /// The action that a caller has ordered and the robot has not got yet.
+    pub(crate) order: Option<ActionId>,
 }
 
 /// How long things take at which a planner looks.
@@ -55,7 +56,11 @@ impl Beliefs {
 
 impl Belief {
     /// Returns what is true of a robot.
-    pub(crate) fn of_truth(pose: GridPose, busy: Option<&BusyAgent>, order: u32) -> Self {
+    pub(crate) fn of_truth(
+        pose: GridPose,
+        busy: Option<&BusyAgent>,
+        order: Option<ActionId>,
+    ) -> Self {
         let still = Self { pose, from: pose.position(), steps_left: 0, delay_steps: 0, order };
         match busy {
             Some(&BusyAgent { from, steps_left, delay_steps, .. }) => {
@@ -81,6 +86,7 @@ impl Belief {
         Self { from, steps_left, ..begun }
     }
 
+    /// Returns why the robot cannot act, as far as is believed.
     pub(crate) fn busy(&self, agent: u32) -> Option<BusyAgent> {
         let Self { from, steps_left, delay_steps, .. } = *self;
         let is_busy = steps_left > 0 || delay_steps > 0;

@@ -27,9 +27,9 @@ impl ErrandFields {
     }
 
     /// Returns the paths to an errand.
-    pub(crate) fn to_errand(&mut self, errand: (u32, u32)) -> Arc<FlowField> {
-        if self.fields.len() >= MAX_FIELDS {
-            self.fields.clear();
+    pub(crate) fn field(&mut self, errand: (u32, u32)) -> Arc<FlowField> {
+        if self.fields.len() >= MAX_FIELDS && !self.fields.contains_key(&errand) {
+            self.fields.pop_first();
         }
         let Self { free, size, fields } = self;
         let field = fields

@@ -99,19 +99,19 @@ impl RobotsWorld {
     ) {
         for (robot, id) in team.robots.clone().enumerate() {
             let pose = situation.poses[robot];
+            let order = &state.body(id).memory;
             // Its order stands until it can act.
             if situation.busy_agent(robot).is_some() {
                 memory.planned[robot] = Some(pose);
+                // One that it has got already, and has not carried out since it is late, is gone.
+                if team.leader.reports.is_some() {
+                    decide::Avoidance::order(order, STAY);
+                }
                 continue;
             }
-            let order = &state.body(id).memory;
             if let Some(belief) = memory.beliefs.robots.get_mut(robot) {
                 // An order that it did not carry out, because it was late, is gone: the planner takes it that it did.
-                let action = std::mem::take(&mut belief.order).checked_sub(1);
-                decide::Avoidance::order(
-                    order,
-                    action.map_or(STAY, |action| action as decide::ActionId),
-                );
+                decide::Avoidance::order(order, belief.order.take().unwrap_or(STAY));
             }
             // As those that a planner leads.
             let is_forward = decide::Avoidance::ordered(order) == FORWARD;
@@ -123,6 +123,22 @@ impl RobotsWorld {
         }
     }
 
+    /// Returns where the robots of a team will be and who is busy in cycle `now`, the next one, as far as its planner will
+    /// know.
+    pub(crate) fn situation_known(
+        &self,
+        state: &RobotsState,
+        team: &Team,
+        team_state: &TeamState,
+        now: Cycle,
+    ) -> TeamSituation {
+        let (_planner, memory) = team_state.locked();
+        let mut beliefs = memory.beliefs.clone();
+        let step = memory.planner.pibt.step;
+        let knowledge = Knowledge { beliefs: &mut beliefs, planned: &memory.planned, step };
+        self.known_situation(team, knowledge, self.situation(state, team), now)
+    }
+
     /// Returns what the planner of a team will know in cycle `now`, the next one, if no robot is delayed anew before it.
     pub(crate) fn situation_ahead(
         &self,
@@ -131,12 +147,8 @@ impl RobotsWorld {
         team_state: &TeamState,
         now: Cycle,
     ) -> TeamSituation {
+        let mut situation = self.situation_known(state, team, team_state, now);
         let (planner, memory) = team_state.locked();
-        let mut beliefs = memory.beliefs.clone();
-        let step = memory.planner.pibt.step;
-        let knowledge = Knowledge { beliefs: &mut beliefs, planned: &memory.planned, step };
-        let truth = self.situation(state, team);
-        let mut situation = self.known_situation(team, knowledge, truth, now);
         situation.actions_left = planner.actions_left(&memory.planner, &situation.poses);
         let errands = self.errands_ahead(team_state, &situation.couriers());
         let last = &memory.planner.pibt.goals;

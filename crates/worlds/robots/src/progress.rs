@@ -33,7 +33,7 @@ pub struct Progress {
 pub(super) struct Approach {
     /// The number of the goal among those of its behavior, or of its errand; none for a robot that has none left.
     pub(super) goal: Option<u32>,
-    /// Its place at the last look, of a robot with tasks that at `nearer_at`,
+    /// Its place at the last look,
     pub(super) place: (u32, u32),
     /// and its moves until then.
     pub(super) moves: u32,
@@ -41,8 +41,11 @@ pub(super) struct Approach {
     pub(super) cost: u32,
     /// and from the place where it was nearest to its goal.
     pub(super) least_cost: u32,
-    /// The look at which it had come there.
+    /// The look at which it had come there. Of a robot with tasks, the place is that at this look, and costs are those of the
+    /// looks since then at which its path was searched for.
     pub(super) nearer_at: Cycle,
+    /// A number that changes with each errand that it has done.
+    pub(super) errands_done: u32,
     /// The looks since then at which bodies stood in its way.
     pub(super) obstructions: Vec<Obstruction>,
 }
@@ -112,7 +115,9 @@ impl Progress {
 impl Approach {
     fn write_to(&self, hasher: &mut Hasher) {
         let goal = self.goal.map_or(0, |goal| goal + 1);
-        let words = [goal, self.place.0, self.place.1, self.moves, self.cost, self.least_cost];
+        let place = [self.place.0, self.place.1];
+        let costs = [self.cost, self.least_cost];
+        let words = [&[goal], &place[..], &[self.moves], &costs, &[self.errands_done]].concat();
         words.iter().for_each(|&word| hasher.write_u32(word));
         hasher.write_u64(self.nearer_at);
         hasher.write_u64(self.obstructions.len() as u64);

@@ -49,6 +49,16 @@ pub(crate) enum TeamOrders {
     },
 }
 
+/// Where a robot with a task goes next.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Errand {
+    /// Another one for its next errand.
+    pub(crate) number: u32,
+    /// Errands of its task that it has done.
+    pub(crate) visited: u32,
+    pub(crate) place: (u32, u32),
+}
+
 /// The planner of a team: what changes, and a cache.
 #[derive(Debug)]
 pub(crate) struct TeamState {
@@ -125,27 +135,27 @@ impl TeamState {
         lock(&memory.dispatcher).goal(&memory.state, robot)
     }
 
-    /// Returns the errand of a robot: a number that is another one for its next errand, and where it is. None without a
-    /// task, and on floors where robots with tasks are not looked at.
-    pub(crate) fn errand(&self, robot: usize) -> Option<(u32, (u32, u32))> {
+    /// Returns the errand of a robot; none without a task, and on floors where robots with tasks are not looked at.
+    pub(crate) fn errand(&self, robot: usize) -> Option<Errand> {
         self.errand_fields.as_ref()?;
         let memory = self.tasks()?;
         let own = memory.state.agents[robot]?;
         let place = lock(&memory.dispatcher).goal(&memory.state, robot)?;
-        // Tasks that differ by 2^26 are far apart in time.
-        Some(((own.task as u32) << 6 | own.visited & 63, place))
+        // Six bits for the errands of a task: of two that would be mixed up, the robot has one long before the other.
+        let number = (own.task as u32) << 6 | own.visited & 63;
+        Some(Errand { number, visited: own.visited, place })
     }
 
     /// Returns the paths to the errand of a robot, as [`Self::errand`].
     pub(crate) fn errand_field(&self, robot: usize) -> Option<Arc<FlowField>> {
-        let (_, place) = self.errand(robot)?;
+        let place = self.errand(robot)?.place;
         let fields = self.errand_fields.as_ref()?;
-        Some(lock(fields).to_errand(place))
+        Some(lock(fields).field(place))
     }
 
     /// Records the action that a caller orders for a robot that reports: it gets it when it is believed to be free.
     pub(crate) fn order_action(&self, robot: usize, action: ActionId) {
-        lock(&self.memory).beliefs.robots[robot].order = u32::from(action) + 1;
+        lock(&self.memory).beliefs.robots[robot].order = Some(action);
     }
 
     /// Records the actions of a plan that a caller orders for a robot; the others wait, unless they are ordered, too.

@@ -10,6 +10,7 @@
 //! | actions done, place and heading at its start, where it reports the most actions done, number of actions, the actions by 16 | each robot where there is a plan |
 
 use crate::belief::Belief;
+use crate::effector::ActionId;
 use crate::team_memory::TeamMemory;
 use sidestep_planners::{Action, Execution, GridPose, Plan, PlanCounts};
 
@@ -33,6 +34,7 @@ pub(crate) fn words(memory: &TeamMemory, robot: usize, is_stepwise: bool) -> Vec
     if let Some(belief) = memory.beliefs.robots.get(robot) {
         let Belief { pose, from, steps_left, delay_steps, order } = *belief;
         let places = [packed(Some(pose.position())), u32::from(pose.heading), packed(Some(from))];
+        let order = order.map_or(0, |action| u32::from(action) + 1);
         words.extend(places.into_iter().chain([steps_left, delay_steps, order]));
     }
     if is_stepwise {
@@ -83,6 +85,7 @@ pub(crate) fn restore(memory: &mut TeamMemory, shares: &[&[u32]], is_stepwise: b
             let (col, row) = unpacked(place).unwrap_or_default();
             let pose = GridPose::new(col, row, heading as u8);
             let from = unpacked(from).unwrap_or_default();
+            let order = order.checked_sub(1).map(|action| action as ActionId);
             *belief = Belief { pose, from, steps_left, delay_steps, order };
         }
     }

@@ -255,12 +255,18 @@ fn robot_section(section: &Value) -> Value {
 /// Returns who leads the robots of a section. A planner that knows the true places is privileged.
 fn planner_entry(planner: &Value) -> Value {
     let places = value_or(&planner["places"], "true".into());
+    let is_privileged = places == "true";
+    let reports = (!is_privileged).then(|| {
+        let every = value_or(&planner["report_every"], 1.into());
+        (every, value_or(&planner["report_loss"], 0.0.into()))
+    });
+    let (report_every, report_loss) = reports.unwrap_or_default();
     json!({
         "method": planner["method"],
         "places": places,
-        "is_privileged": places == "true",
-        "report_every": value_or(&planner["report_every"], 1.into()),
-        "report_loss": value_or(&planner["report_loss"], 0.0.into()),
+        "is_privileged": is_privileged,
+        "report_every": report_every,
+        "report_loss": report_loss,
     })
 }
 
@@ -385,9 +391,11 @@ fn planner_text(planner: &Value) -> String {
     let loss_percent = 100.0 * planner["report_loss"].as_f64().unwrap_or(0.0);
     let every = match planner["report_every"].as_u64() {
         Some(1) => "at each action".into(),
-        _ => format!("at one of {} actions", planner["report_every"]),
+        _ => format!("one in {} actions", planner["report_every"]),
     };
-    format!(", led by {method}, which knows their reports {every}, {loss_percent} % of them lost")
+    format!(
+        ", led by {method}, which knows what they report, {every}, {loss_percent:.1} % of it lost"
+    )
 }
 
 fn sensor_text(sensor: &Value) -> String {

@@ -77,12 +77,15 @@ impl<T: OccupantWord> Inspector<'_, T> {
         let team_state: &TeamState = &self.cycle.state.planner_teams[team];
         let errand = team_state.goal_of_task(robot);
         // Before the locks are taken, which it takes, too.
-        let known = world.situation_ahead(
+        let now = self.cycle.now;
+        let known = world.situation_known(
             self.present,
             &world.planner_teams[team],
             &self.present.planner_teams[team],
-            self.cycle.now,
+            now,
         );
+        let is_free =
+            known.busy_agent(robot).is_none() && world.bodies[self.id as usize].is_due(now);
         let (planner, memory) = team_state.locked();
         let mut path: Vec<(u32, u32)> = planner
             .path_ahead(&memory.planner, robot)
@@ -102,7 +105,7 @@ impl<T: OccupantWord> Inspector<'_, T> {
             path,
             before: before.into_iter().map(|other| robots.start + other as EntityId).collect(),
             off_plan: memory.off_plan[robot],
-            is_waiting: memory.planned[robot].is_none_or(|planned| planned == pose),
+            is_waiting: is_free && memory.planned[robot].is_none_or(|planned| planned == pose),
             believed,
         })
     }

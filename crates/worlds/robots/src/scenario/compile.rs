@@ -32,6 +32,7 @@ use crate::decide::{
     SensorTrust, Shuttle, StallDetector, Wander,
 };
 use crate::effector::{ActionId, EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition};
+use crate::errand_fields::MAX_WATCHED_BOXES;
 use crate::policy::ConflictPolicy;
 use crate::purpose;
 use crate::sensor::SensorModel;
@@ -199,6 +200,7 @@ impl<'a> Compiler<'a> {
         let firsts = placer.first_ids();
         let sections = placer.groups.iter().zip(firsts).take(robots);
         self.warn_of_unreachable_goals(sections.clone(), &placed);
+        self.warn_of_unwatched_tasks(sections.clone());
         self.warn_of_unreachable_tasks(sections, &placed);
         self.finish(order, placer, placed)
     }
@@ -220,6 +222,7 @@ impl<'a> Compiler<'a> {
         let has_long_actions = placer.groups.iter().any(|group| group.action_cycles > 1);
         let kind_rank = self.kind_rank()?;
         let planner_teams = placer.planner_teams();
+        let watched = watched_robots(&goal_robots, &planner_teams, &self.map);
         let mut world = RobotsWorld {
             walls: padded(&self.map, self.border, stride, rows),
             regime: self.file.regime,
@@ -234,7 +237,7 @@ impl<'a> Compiler<'a> {
             radio,
             teams: Arc::default(),
             robots,
-            watched_robots: watched_robots(&goal_robots, &planner_teams),
+            watched_robots: watched,
             planner_teams,
             goal_robots,
             stops_at_gridlock: self.file.stop.gridlock,
@@ -336,8 +339,9 @@ impl<'a> Compiler<'a> {
 }
 
 /// Returns the robots that are watched for gridlocks, by rising id.
-fn watched_robots(goal_robots: &[EntityId], teams: &[Team]) -> Vec<EntityId> {
-    let with_tasks = teams.iter().filter(|team| team.tasks.is_some());
+fn watched_robots(goal_robots: &[EntityId], teams: &[Team], map: &GridMap) -> Vec<EntityId> {
+    let is_watched = map.cells().len() <= MAX_WATCHED_BOXES;
+    let with_tasks = teams.iter().filter(|team| is_watched && team.tasks.is_some());
     let mut all = goal_robots.to_vec();
     all.extend(with_tasks.flat_map(|team| team.robots.clone()));
     all.sort_unstable();

@@ -50,9 +50,17 @@ impl RobotsWorld {
             }
             let window = self.stall_cycles(id);
             approach.obstructions.retain(|obstruction| now - obstruction.at < window);
-            // The paths to an errand are searched for only where it is likely that the robot is stalled.
-            let is_likely = !self.has_errands(id) || now - approach.nearer_at >= window / 2;
-            let steps = if is_likely { self.steps_in_way(state, id) } else { None };
+            if self.has_errands(id) {
+                // The paths to an errand are searched for only where it is likely that the robot is stalled.
+                if now - approach.nearer_at < window / 2 {
+                    continue;
+                }
+                self.compare_errand_cost(approach, state, id, now);
+                if approach.nearer_at == now {
+                    continue;
+                }
+            }
+            let steps = self.steps_in_way(state, id);
             approach.obstructions.extend(steps.map(|steps| Obstruction { at: now, steps }));
             if now - approach.nearer_at >= window {
                 stalled.push(id);
@@ -153,8 +161,9 @@ impl RobotsWorld {
         }
     }
 
-    /// Brings the approach of a robot with tasks up to date. It counts as coming nearer when it gets far from where it was:
-    /// to know what its path costs, paths from everywhere to its errand would have to be searched for at each errand.
+    /// Brings the approach of a robot with tasks up to date. It counts as coming nearer when it has done an errand, or gets
+    /// far from where it was: to know what its path costs, paths from everywhere to its errand would have to be searched
+    /// for at each errand.
     fn update_errand_approach(
         &self,
         approach: &mut Approach,
@@ -163,17 +172,53 @@ impl RobotsWorld {
         now: Cycle,
     ) {
         let place = self.map_position(body.position());
-        let errand = place_in_team(self, body.id)
-            .and_then(|(team, robot)| state.planner_teams[team].errand(robot));
-        let number = errand.map(|(number, _)| number);
+        let number = place_in_team(self, body.id)
+            .and_then(|(team, robot)| state.planner_teams[team].errand(robot))
+            .map(|errand| errand.number);
+        let errands_done = self.errands_done(state, body);
         let boxes = approach.place.0.abs_diff(place.0).max(approach.place.1.abs_diff(place.1));
-        if number.is_none() || number != approach.goal || boxes >= FAR_BOXES {
+        // A task that nobody has begun may be given to another robot at any time: that is no progress of either.
+        let has_done_one = errands_done != approach.errands_done;
+        if number.is_none() || approach.goal.is_none() || has_done_one || boxes >= FAR_BOXES {
             approach.place = place;
             approach.nearer_at = now;
             approach.obstructions.clear();
         }
+        if number != approach.goal {
+            approach.least_cost = u32::MAX;
+        }
         approach.goal = number;
+        approach.errands_done = errands_done;
         approach.moves = body.moves.get();
+    }
+
+    /// Returns a number that changes whenever a robot with tasks has done an errand.
+    fn errands_done(&self, state: &RobotsState, body: &BodyState) -> u32 {
+        let visited = place_in_team(self, body.id)
+            .and_then(|(team, robot)| state.planner_teams[team].errand(robot))
+            .map_or(0, |errand| errand.visited);
+        // A task has fewer errands than that, or two that differ so are far apart in time.
+        body.trips.get() << 8 | visited & 0xff
+    }
+
+    /// Notes whether a robot with tasks that may be stalled is nearer to its errand than at any look before at which it may
+    /// have been.
+    fn compare_errand_cost(
+        &self,
+        approach: &mut Approach,
+        state: &RobotsState,
+        id: EntityId,
+        now: Cycle,
+    ) {
+        let Some((team, robot)) = place_in_team(self, id) else { return };
+        let Some(field) = state.planner_teams[team].errand_field(robot) else { return };
+        let (col, row) = self.map_position(state.body(id).position());
+        let Some(cost) = field.cost(col, row) else { return };
+        if approach.least_cost != u32::MAX && cost < approach.least_cost {
+            approach.nearer_at = now;
+            approach.obstructions.clear();
+        }
+        approach.least_cost = approach.least_cost.min(cost);
     }
 
     /// Returns whether a robot is one of a team with tasks.

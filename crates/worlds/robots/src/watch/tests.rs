@@ -2,6 +2,7 @@
 
 use crate::metrics::Counters;
 use crate::progress::Gridlock;
+use crate::scenario::{Behaviours, Compiled, StorageOrder};
 use crate::state::RobotsState;
 use crate::{RobotsRun, robots_run};
 use serde_json::{Value, json};
@@ -283,4 +284,49 @@ fn robots_with_tasks_that_get_on_are_in_no_gridlock() {
         "{}",
         metric(&run, "tasks_finished")
     );
+}
+
+/// Two robots that block each other, and two others that go on with the same tasks on a floor of their own.
+const HALF_JAMMED: &str = "[map]\nascii = \"\"\"\n............\n############\n............\n............\n\"\"\"\n\
+    [[robots]]\nat = [[2, 3, 0], [9, 3, 2]]\nplanner = { method = \"pibt\" }\n\
+    tasks = { list = [[[11, 3], [0, 3]]], policy = \"fifo\", reveal = 1.0 }\n\
+    [[robots]]\nat = [[2, 0, 0], [9, 1, 2]]\nplanner = { method = \"pibt\" }\n\
+    tasks = { list = [[[11, 0]], [[0, 1]]], policy = \"nearest\", reveal = 2.0 }\n";
+
+#[test]
+fn robots_with_tasks_that_others_finish_meanwhile_are_in_a_gridlock_all_the_same() {
+    let mut run = run(HALF_JAMMED);
+    run.advance(1_000);
+    assert!(metric(&run, "tasks_finished").as_u64() > Some(100));
+    assert_eq!(metric(&run, "gridlocks"), json!(1));
+    assert_eq!(metric(&run, "robots_in_gridlock"), json!(2));
+}
+
+#[test]
+fn a_full_hall_in_which_tasks_are_finished_has_no_gridlock() {
+    let text = "conflict_policy = \"simultaneous\"\n[map]\nascii = \"\"\"\n........\n........\n........\n\
+        ........\n........\n........\n\"\"\"\n[[robots]]\ncount = 24\nplanner = { method = \"pibt\" }\n\
+        tasks = { list = [[[0, 0], [7, 5]], [[7, 0]], [[0, 5], [3, 2]]], reveal = 1.5 }\n";
+    let mut run = run(text);
+    run.advance(4_000);
+    assert!(
+        metric(&run, "tasks_finished").as_u64() > Some(100),
+        "{}",
+        metric(&run, "tasks_finished")
+    );
+    assert_eq!(metric(&run, "gridlocks"), json!(0));
+}
+
+#[test]
+fn a_run_that_should_end_by_a_gridlock_of_robots_that_are_not_watched_is_a_warning() {
+    let rows = format!("{}\n", ".".repeat(130)).repeat(130);
+    let text = format!(
+        "format = 1\nworld = \"robots\"\nstop.gridlock = true\nmap.ascii = \"\"\"\n{rows}\"\"\"\n[robots]\ncount = 2\n\
+         planner = {{ method = \"pibt\" }}\ntasks = {{ list = [[[3, 3]]] }}\n"
+    );
+    let source = Source::new("s", &text, "");
+    let compiled = Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial);
+    let remarks = compiled.expect("it compiles").remarks;
+    let told: Vec<String> = remarks.iter().map(|remark| format!("{remark:?}")).collect();
+    assert!(told.iter().any(|words| words.contains("does not end by gridlocks")), "{told:?}");
 }

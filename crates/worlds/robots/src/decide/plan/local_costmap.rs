@@ -90,6 +90,8 @@ struct Crossing {
 
 impl BeamPath {
     fn new(wall: u8, crossed: Box<[BeamBox]>) -> Self {
+        // A class is one of distance, which grows along a beam.
+        debug_assert!(crossed.is_sorted_by_key(|one| one.class), "classes rise along a beam");
         let last_class = crossed.last().map_or(0, |one| one.class);
         let first_of_class = |class: u8| crossed.partition_point(|one| one.class < class);
         // One more than there are, so that each class ends where the next one begins.

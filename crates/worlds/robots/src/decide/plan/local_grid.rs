@@ -30,8 +30,8 @@ pub(super) struct LocalGrid {
 pub(super) type Exits = [LocalBoxSet; EXIT_LEVELS];
 
 impl LocalGrid {
-    /// Returns the grid around a robot, and writes its exits, which are too large to be returned; none where no path leads
-    /// out of it.
+    /// Returns the grid around a robot, and adds its exits to `into_exits`, since they are too large to be returned; none
+    /// where no path leads out of it.
     pub(super) fn new(
         view: &LocalView<'_>,
         prices: StepCosts,
@@ -75,7 +75,7 @@ fn place_prices(view: &LocalView<'_>, prices: StepCosts) -> [(LocalBoxSet, u16);
     ]
 }
 
-/// Writes the places from which the static map's path may be followed: goals, and those where it leads out of the
+/// Adds the places from which the static map's path may be followed: goals, and those where it leads out of the
 /// planned square, or along its edge. Where it leads back in, it may lead to the same obstacle again. Returns whether there
 /// are any.
 fn write_exits(
@@ -100,7 +100,6 @@ fn write_exits(
         rises[number] = rise;
         least = least.min(rise);
     }
-    *exits = [LocalBoxSet::default(); EXIT_LEVELS];
     for number in found.numbers() {
         let level = (rises[number] - least) as usize;
         exits[level.min(EXIT_LEVELS - 1)].insert_number(number);

@@ -114,8 +114,6 @@ impl Compiler<'_> {
         let has_reports = planner.places == KnownPlaces::Believed;
         let report_every_span = planner.report_every.as_ref().map(Spanned::span);
         let report_loss_span = planner.report_loss.as_ref().map(Spanned::span);
-        let loses_all =
-            planner.report_loss.as_ref().is_some_and(|loss| f64::from(*loss.get_ref()) >= 1.0);
         let ordered_actions = window(planner).unwrap_or(DEFAULT_ORDERED_ACTIONS);
         let file_span = planner.file.as_ref().map(Spanned::span);
         let faults = [
@@ -158,11 +156,6 @@ impl Compiler<'_> {
                 file_span.filter(|_| !is_given),
                 "`file` has no effect without method = \"file\"",
                 "leave it out, or give method = \"file\"",
-            ),
-            (
-                report_every_span.clone().filter(|_| loses_all),
-                "`report_every` has no effect where all reports are lost",
-                "leave it out, or give report_loss below 1",
             ),
             (
                 window_span.filter(|_| is_external && ordered_actions > MAX_ORDERED_ACTIONS),

@@ -3,6 +3,7 @@
 use super::super::RobotsFile;
 use super::bodies::BodyGroup;
 use super::*;
+use crate::errand_fields::MAX_WATCHED_BOXES;
 use sidestep_planners::Dispatcher;
 
 /// Returns warnings of effectors that move otherwise than their author may expect.
@@ -123,6 +124,24 @@ impl Compiler<'_> {
                 );
                 self.remarks.push(Remark::warning(format!("robots.{k}"), words));
             }
+        }
+    }
+
+    /// Warns where a run should end by a gridlock of robots that are not watched.
+    pub(super) fn warn_of_unwatched_tasks<'g>(
+        &mut self,
+        groups: impl Iterator<Item = (&'g BodyGroup, EntityId)>,
+    ) {
+        let boxes = self.map.cells().len();
+        if !self.file.stop.gridlock || boxes <= MAX_WATCHED_BOXES {
+            return;
+        }
+        for (k, _) in groups.enumerate().filter(|(_, (group, _))| group.tasks.is_some()) {
+            let words = format!(
+                "the run does not end by gridlocks of these robots: those with tasks are watched on floors of up to \
+                 {MAX_WATCHED_BOXES} boxes, and this one has {boxes}. Leave out `[stop] gridlock`, or give a smaller map"
+            );
+            self.remarks.push(Remark::warning(format!("robots.{k}.tasks"), words));
         }
     }
 
