@@ -228,7 +228,7 @@ impl MapResults {
                 ALL_WHEELS.iter().filter_map(|wheels| self.case(robots, wheels, method)).collect();
             let is_privileged = cases.iter().any(|case| case.has_text("privileged", "yes"));
             let mark = if is_privileged { PRIVILEGE_MARK } else { "" };
-            series.push(bars(&format!("{method}{mark}"), cases.into_iter(), "throughput"));
+            series.push(bars(format!("{method}{mark}"), cases, "throughput"));
         }
         let categories = ALL_WHEELS.map(String::from).to_vec();
         let labels = ["wheels", "trips in 1,000 robot-cycles"];
