@@ -33,6 +33,15 @@ pub struct BusyAgent {
     pub delay_steps: u32,
 }
 
+/// The rules by which a team steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepRules {
+    /// Steps that an action takes.
+    pub(crate) action_steps: u32,
+    /// Whether an agent can enter a box that another one leaves in the same step.
+    pub(crate) may_follow: bool,
+}
+
 /// Priority inheritance, for agents in step with each other or not.
 #[derive(Debug, Clone)]
 pub(crate) enum Stepper {
@@ -46,11 +55,16 @@ impl Stepper {
     pub(crate) fn new(
         free: &FreeSpace,
         sizes: &[u32],
-        action_steps: u32,
+        rules: StepRules,
         seed: Seed,
     ) -> Result<Self, InputError> {
-        if action_steps > 1 && sizes.iter().all(|&size| size == 1) {
-            let planner = TickPlanner::new(free, sizes.len(), action_steps, seed, MAX_FIELD_BYTES);
+        let StepRules { action_steps, may_follow } = rules;
+        // Plans of common steps lead into boxes that others leave in the same step: where that fails, a full crowd would
+        // stand still.
+        let enters_free_boxes_only = action_steps > 1 || !may_follow;
+        if enters_free_boxes_only && sizes.iter().all(|&size| size == 1) {
+            let ticks = action_steps.max(1);
+            let planner = TickPlanner::new(free, sizes.len(), ticks, seed, MAX_FIELD_BYTES);
             return Ok(Self::Apart(Box::new(AsynchronousStepper { planner, agents: Vec::new() })));
         }
         let config = PibtConfig { seed, action_steps, ..PibtConfig::default() };

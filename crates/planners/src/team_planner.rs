@@ -9,8 +9,8 @@ use crate::lacam::{self, LacamConfig};
 use crate::pibt::PibtState;
 use crate::plan::Plan;
 use crate::pose::{Action, ActionModel, GridPose};
-use crate::stepper::Stepper;
 pub use crate::stepper::{BusyAgent, TeamStep};
+use crate::stepper::{StepRules, Stepper};
 use crate::{cbs, prioritized};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{InputError, Seed};
@@ -178,7 +178,8 @@ impl TeamPlanner {
         config: TeamPlannerConfig,
     ) -> Result<Self, InputError> {
         check_sizes(sizes.iter().copied())?;
-        let stepper = Stepper::new(free, sizes, config.action_steps, config.seed)?;
+        let TeamPlannerConfig { action_steps, may_follow, seed, .. } = config;
+        let stepper = Stepper::new(free, sizes, StepRules { action_steps, may_follow }, seed)?;
         let graphs = Graphs::new(free, sizes.iter().copied());
         let sizes = sizes.to_vec();
         Ok(Self { free: free.clone(), graphs, sizes, config, stepper, actions: Vec::new() })

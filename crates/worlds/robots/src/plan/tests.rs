@@ -311,3 +311,18 @@ fn two_hundred_plans_are_carried_out_by_reliable_robots_to_the_step() {
         flights += 1;
     }
 }
+
+#[test]
+fn a_full_corridor_does_not_stand_still_whatever_the_conflict_policy() {
+    for policy in ["random", "fixed", "simultaneous"] {
+        let text = CORRIDOR.replace(
+            "conflict_policy = \"simultaneous\"",
+            &format!("conflict_policy = \"{policy}\""),
+        );
+        let mut run = run(&text, 1);
+        run.advance(1_000);
+        let metrics = run.metrics();
+        assert!(metrics.total.trips >= 50, "{policy}: {metrics:?}");
+        assert_eq!(metrics.total.contacts, 0, "{policy}");
+    }
+}
