@@ -1,4 +1,5 @@
-//! The next actions of agents of one box whose actions take several ticks.
+//! The next actions of agents of one box that enter free boxes only: whose actions take several ticks, or where a box that
+//! is left cannot be entered in the same one.
 //!
 //! An agent on its way from one box to the next holds both, and nobody enters a box that is held. There is no common step:
 //! each agent that ended its action gets the next one at once, by priority inheritance (Okumura et al. 2022, "Priority

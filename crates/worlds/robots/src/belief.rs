@@ -38,7 +38,7 @@ pub(crate) struct Belief {
     pub(crate) order: Option<ActionId>,
 }
 
-/// How long things take at which a planner looks.
+/// The lengths of a turn of the planner and of an action.
 #[derive(Clone, Copy)]
 pub(crate) struct TurnLengths {
     /// Cycles from one turn of the planner to the next.

@@ -1,6 +1,6 @@
 //! Tasks of a team: its robots go where their errands are, one after the other, and get the next task when they are done.
 //!
-//! The planner of the team dispatches them in the phase *plan*: it is privileged there as it is in leading robots.
+//! The planner of the team dispatches them in the phase *plan*, by the places that it knows in leading robots.
 
 use super::decide::Errands;
 use super::plan::place_in_team;

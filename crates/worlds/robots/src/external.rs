@@ -22,7 +22,7 @@ mod tests;
 /// for a whole run, which would else grow with the number of robots.
 const MAX_HEARD: usize = 64;
 
-/// The order of a plan.
+/// The order of a plan, by its name: a row of actions by their numbers.
 const PLAN: &str = "plan";
 
 /// Robots that make up a team.

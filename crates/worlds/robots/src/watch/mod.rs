@@ -11,6 +11,7 @@ use super::perceive::memory_of;
 use super::plan::place_in_team;
 use super::progress::{Approach, Gridlock, GridlockEvent, Obstruction, Progress};
 use super::state::{BodyState, RobotsState};
+use super::team::Errand;
 use super::world::{RobotsWorld, Role};
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_map::planning::FlowField;
@@ -172,10 +173,10 @@ impl RobotsWorld {
         now: Cycle,
     ) {
         let place = self.map_position(body.position());
-        let number = place_in_team(self, body.id)
-            .and_then(|(team, robot)| state.planner_teams[team].errand(robot))
-            .map(|errand| errand.number);
-        let errands_done = self.errands_done(state, body);
+        let errand = place_in_team(self, body.id)
+            .and_then(|(team, robot)| state.planner_teams[team].errand(robot));
+        let number = errand.map(|errand| errand.number);
+        let errands_done = errands_done(body, errand);
         let boxes = approach.place.0.abs_diff(place.0).max(approach.place.1.abs_diff(place.1));
         // A task that nobody has begun may be given to another robot at any time: that is no progress of either.
         let has_done_one = errands_done != approach.errands_done;
@@ -190,15 +191,6 @@ impl RobotsWorld {
         approach.goal = number;
         approach.errands_done = errands_done;
         approach.moves = body.moves.get();
-    }
-
-    /// Returns a number that changes whenever a robot with tasks has done an errand.
-    fn errands_done(&self, state: &RobotsState, body: &BodyState) -> u32 {
-        let visited = place_in_team(self, body.id)
-            .and_then(|(team, robot)| state.planner_teams[team].errand(robot))
-            .map_or(0, |errand| errand.visited);
-        // A task has fewer errands than that, or two that differ so are far apart in time.
-        body.trips.get() << 8 | visited & 0xff
     }
 
     /// Notes whether a robot with tasks that may be stalled is nearer to its errand than at any look before at which it may
@@ -279,6 +271,13 @@ impl RobotsState {
     pub(super) fn waits_of(&self, id: EntityId) -> u64 {
         if self.waits.is_empty() { 0 } else { u64::from(self.waits.get(id as usize)) }
     }
+}
+
+/// Returns a number that changes whenever a robot with tasks has done an errand.
+fn errands_done(body: &BodyState, errand: Option<Errand>) -> u32 {
+    let visited = errand.map_or(0, |errand| errand.visited);
+    // Eight bits for the errands of a task: of two that would be mixed up, the robot has done one long before the other.
+    body.trips.get() << 8 | visited & 0xff
 }
 
 /// Returns what the path of a robot costs that still goes to the goal of the last look. Few steps change it by an
