@@ -215,7 +215,7 @@ mod tests {
             let moved = moved.checked_sub(1);
             let prices = StepCosts { blocked: 31, beside: 6, vague: 5, off_lane: 8, is_on_detour: false, moved, is_sidestep };
             let view =
-                LocalView { field: &field, at, heading, blocked, vague, is_careful: true, is_done: false, is_alone: false };
+                LocalView { field: &field, at, heading, blocked, vague, may_err: true, is_done: false, is_alone: false };
             let step = first_step(&view, prices);
             let mut exits = [LocalBoxSet::default(); EXIT_LEVELS];
             let Some(grid) = LocalGrid::new(&view, prices, &mut exits) else {
@@ -241,7 +241,7 @@ mod tests {
             heading: 0,
             blocked,
             vague,
-            is_careful: false,
+            may_err: false,
             is_done: false,
             is_alone: false,
         };

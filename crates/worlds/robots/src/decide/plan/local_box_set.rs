@@ -64,6 +64,11 @@ impl LocalBoxSet {
         self.0 == 0
     }
 
+    /// Returns the number of places.
+    pub(super) fn len(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
     pub(super) fn insert(&mut self, col: i32, row: i32) {
         if let Some(n) = Self::index(col, row) {
             self.0 |= 1 << n;

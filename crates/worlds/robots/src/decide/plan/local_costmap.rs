@@ -18,12 +18,14 @@ const SEARCH_SIDE_BOXES: i32 = FREE_WINDOW_COLUMNS as i32;
 /// The walls among the boxes in which something is looked for.
 type FreeWindow = sidestep_map::planning::FreeWindow<FREE_WINDOW_COLUMNS>;
 
-/// Most boxes that one report of a class other than the nearest may block. A class of many boxes with one
+/// Most boxes in one of which a report of a class other than the nearest may be for it to block them. A class of many boxes with one
 /// thing somewhere in them would wall a corridor off; its boxes are vague instead.
 const MAX_EXACT_BOXES: usize = 2;
-/// Votes of one beam for a box that it has passed, where beams are reliable: it outweighs 63 reports, each
-/// of which says only that something is in one of several boxes.
-const RELIABLE_VOTES: i32 = 64;
+/// Votes of a beam for each box that it has passed, and against each of a few boxes in one of which it reports something.
+/// Over more boxes they are spread, so that a report of one in many does not outweigh a beam that has passed.
+const BEAM_VOTES: i32 = 60;
+/// Votes of a beam for a box that it has passed, where beams are reliable: more than all reports have together.
+const RELIABLE_VOTES: i32 = 1 << 16;
 
 /// Places around a robot where something is that the static map does not show.
 #[derive(Debug, Clone, Copy, Default)]
@@ -67,6 +69,8 @@ struct BeamPath {
     crossed: Box<[BeamBox]>,
     /// By distance class: the number of its first box.
     starts: Box<[usize]>,
+    /// Boxes of the last of these classes that are beyond those that are looked at.
+    unsearched: usize,
 }
 
 /// A box that a beam crosses, seen from the robot's lower-left box.
@@ -89,14 +93,19 @@ struct Crossing {
 }
 
 impl BeamPath {
-    fn new(wall: u8, crossed: Box<[BeamBox]>) -> Self {
+    /// Returns a beam that crosses these boxes, as far as they are looked at.
+    fn new(wall: u8, all: Vec<BeamBox>) -> Self {
+        let is_beyond = |one: &BeamBox| !(is_searched(one.col) && is_searched(one.row));
+        let searched = all.iter().position(is_beyond).unwrap_or(all.len());
+        let (crossed, beyond) = all.split_at(searched);
         // A class is one of distance, which grows along a beam.
         debug_assert!(crossed.is_sorted_by_key(|one| one.class), "classes rise along a beam");
         let last_class = crossed.last().map_or(0, |one| one.class);
         let first_of_class = |class: u8| crossed.partition_point(|one| one.class < class);
         // One more than there are, so that each class ends where the next one begins.
         let starts = (0..=last_class + 1).map(first_of_class).collect();
-        Self { wall, crossed, starts }
+        let unsearched = beyond.iter().filter(|one| one.class == last_class).count();
+        Self { wall, crossed: crossed.into(), starts, unsearched }
     }
 
     /// Returns the number of the first box of a class, or of a later one; that of all boxes where there is none.
@@ -108,6 +117,11 @@ impl BeamPath {
     fn first_wall(&self, free: &FreeWindow) -> usize {
         let first = self.crossed.iter().position(|crossed| crossed.is_wall(free));
         first.unwrap_or(self.crossed.len())
+    }
+
+    /// Returns the number of boxes beyond those that are looked at in which a report of something in a stretch may be, too.
+    fn unsearched_after(&self, end: usize) -> usize {
+        if end == self.crossed.len() { self.unsearched } else { 0 }
     }
 
     /// Returns the stretch of the beam in which there is something that is not the wall behind it; `first_wall` is that of
@@ -127,8 +141,8 @@ impl BeamPath {
         (!is_explained && first < first_wall).then_some(first..first_wall)
     }
 
-    /// Returns what a reading says of one of the boxes: votes for it being free, -1 if something may be in it, and 0
-    /// of a box that it knows nothing of. `first_wall` is that of the beam.
+    /// Returns what a reading says of one of the boxes: votes for it being free, fewer than 0 if something may be in
+    /// it, and 0 of a box that it knows nothing of. `first_wall` is that of the beam.
     fn votes(&self, number: usize, reading: Reading, first_wall: usize, passed: i32) -> i32 {
         let class = self.crossed[number].class;
         let is_passed = reading.observation == NOTHING || class < reading.class;
@@ -140,9 +154,15 @@ impl BeamPath {
             return passed;
         }
         // The thing is in a box of this class; where it is the wall behind them, they are free.
-        let is_wall_of_class = first_wall < self.start_of(class.saturating_add(1));
-        let is_explained = reading.observation == self.wall && is_wall_of_class;
-        if is_explained { passed } else { -1 }
+        let end_of_class = self.start_of(class.saturating_add(1));
+        let is_explained = reading.observation == self.wall && first_wall < end_of_class;
+        if is_explained {
+            return passed;
+        }
+        let end = end_of_class.min(first_wall);
+        let boxes = end - self.start_of(class) + self.unsearched_after(end);
+        let shares = if boxes <= MAX_EXACT_BOXES { 1 } else { boxes as i32 };
+        -BEAM_VOTES / shares
     }
 }
 
@@ -190,6 +210,8 @@ impl BeamBox {
 /// The boxes in which something was reported: a stretch of a beam.
 struct OccupiedSegment<'a> {
     boxes: &'a [BeamBox],
+    /// Boxes beyond those that are looked at in which it may be as well.
+    unsearched: usize,
     is_near: bool,
 }
 
@@ -256,8 +278,11 @@ impl BeamModel {
             let Some(range) = beam.occupied_range(reading, walls.first_wall(number)) else {
                 continue;
             };
-            let segment =
-                OccupiedSegment { boxes: &beam.crossed[range], is_near: reading.class == 0 };
+            let segment = OccupiedSegment {
+                unsearched: beam.unsearched_after(range.end),
+                boxes: &beam.crossed[range],
+                is_near: reading.class == 0,
+            };
             let costmap = costmap.get_or_insert_with(LocalCostmap::default);
             self.block(&segment, percept, &mut walls, costmap);
         }
@@ -282,16 +307,16 @@ impl BeamModel {
             places = places.union(crossed.places);
             boxes += 1;
         }
-        let is_exact = segment.is_near || boxes <= MAX_EXACT_BOXES;
+        let is_exact = segment.is_near || boxes + segment.unsearched <= MAX_EXACT_BOXES;
         let all = if is_exact { &mut costmap.blocked } else { &mut costmap.vague };
         *all = all.union(places);
     }
 
     /// Returns whether the votes of all beams that cross a box say that it is free: one beam that has passed it decides
-    /// where beams are reliable, and most of them where they are not.
+    /// where beams are reliable, and the weight of all where they are not.
     fn is_free(&self, crossed: &BeamBox, percept: &Percept<'_>, walls: &mut BeamWalls<'_>) -> bool {
         let heading = usize::from(percept.heading);
-        let passed = if self.are_reliable { RELIABLE_VOTES } else { 1 };
+        let passed = if self.are_reliable { RELIABLE_VOTES } else { BEAM_VOTES };
         let crossings = crossed.crossings.start as usize..crossed.crossings.end as usize;
         let mut votes = 0;
         for crossing in &self.crossings[heading][crossings] {
@@ -350,8 +375,7 @@ fn beam_paths(sensor: &MountedSensor, size: u32, heading: u8, box_size_m: f64) -
             let places = covering_places(size, (turned.dx, turned.dy));
             BeamBox { col: turned.dx, row: turned.dy, class, places, crossings: 0..0 }
         });
-        let crossed = beam_boxes.take_while(|one| is_searched(one.col) && is_searched(one.row));
-        paths.push(BeamPath::new(wall, crossed.collect()));
+        paths.push(BeamPath::new(wall, beam_boxes.collect()));
     }
     paths
 }
@@ -384,4 +408,46 @@ fn step_beams(beams: &[BeamPath], size: i32, direction: u8) -> Box<[StepBeam]> {
 /// Returns whether something is looked for in boxes of this column or row.
 fn is_searched(offset: i32) -> bool {
     (-PLAN_RADIUS_BOXES..SEARCH_SIDE_BOXES - PLAN_RADIUS_BOXES).contains(&offset)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decide::UNSEEN;
+    use crate::scenario::StorageOrder;
+    use crate::test_runs::run_in_order;
+    use crate::world::Role;
+
+    /// Observation and distance class of a robot that a sonar ring sees at 0.3 to 1.5 m.
+    const MEDIUM_ROBOT: Reading = Reading { observation: 4, class: 1 };
+
+    #[test]
+    fn a_report_ahead_says_the_same_of_the_places_ahead_at_all_four_headings() {
+        let text = "format = 1\nworld = \"robots\"\nregime = \"both\"\nmap.ascii = \"...\"\n\
+                    [[robots]]\nat = [[1, 0, 0]]\nsensors = [\"sonar-ring\"]\n";
+        let run = run_in_order(text, 1, StorageOrder::Spatial);
+        let Role::Robot(model) = &run.world().type_of(0).role else { panic!("it is a robot") };
+        let walls = Arc::new(FreeSpace::new(40, 40, |_, _| true));
+        let beam_model = BeamModel::new(walls, 1, &model.body, 0.25);
+        let nothing = Reading { observation: NOTHING, class: 0 };
+        let mut readings = vec![nothing; model.body.sectors.len()];
+        readings[0] = MEDIUM_ROBOT;
+        let sizes = [0, 1, 2, 3].map(|heading| {
+            let percept = Percept {
+                now: 0,
+                id: 0,
+                readings: &readings,
+                sectors: &model.body.sectors,
+                nearest_in: [UNSEEN; 4],
+                contact: None,
+                at: (20, 20),
+                heading,
+                heard: &[],
+            };
+            let costmap = beam_model.local_costmap(&percept).expect("something is noticed");
+            (costmap.blocked.len(), costmap.vague.len())
+        });
+        assert!(sizes[0].1 > 0, "it may be in one of several places: {sizes:?}");
+        assert_eq!(sizes, [sizes[0]; 4]);
+    }
 }

@@ -14,8 +14,8 @@ pub(super) struct LocalView<'a> {
     pub(super) vague: LocalBoxSet,
     /// Whether it has reached its last goal before.
     pub(super) is_done: bool,
-    /// Whether sensors or wheels err, so that it had better keep its distance.
-    pub(super) is_careful: bool,
+    /// Whether sensors or wheels err.
+    pub(super) may_err: bool,
     /// Whether no other body is noticed.
     pub(super) is_alone: bool,
 }

@@ -8,7 +8,7 @@ use super::super::pass_request::{self, OWN_REQUEST_WORD, PassRequest};
 const PLANNER_MEMORY_WORD: usize = 1;
 
 /// Most decisions to stand still before something that a robot can count.
-pub(super) const MAX_WAITED: u8 = 7;
+pub(super) const MAX_WAITED: u8 = 31;
 
 /// Everything that a planning robot remembers between its actions, beside its progress on its list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -27,7 +27,7 @@ pub(super) struct PlannerMemory {
     pub(super) bump_left: u8,
     /// Its request as a word, 0 for none.
     pub(super) request: u32,
-    /// Decisions for which it makes room, or keeps away from the room it has made; up to 7.
+    /// Decisions for which it makes room, or keeps away from the room it has made; up to 1.
     pub(super) yield_left: u8,
     /// Direction in which it makes room.
     pub(super) yield_to: u8,
@@ -35,7 +35,7 @@ pub(super) struct PlannerMemory {
     pub(super) yield_pending: bool,
     /// Rank of the request that it follows, in steps of 8 to save bits; its own request has that rank.
     pub(super) yield_rank: u8,
-    /// Decisions to stand still before something since the last move; up to 7.
+    /// Decisions to stand still before something since the last move; up to 31.
     pub(super) waited: u8,
     /// Actions left of a walk at random out of a deadlock, or of a detour; up to 15.
     pub(super) stray_left: u8,
@@ -54,11 +54,11 @@ impl PlannerMemory {
             bump: one.read_u8(2),
             bump_left: one.read_u8(3),
             request: two.read_u32(pass_request::REQUEST_BITS),
-            yield_left: two.read_u8(3),
+            yield_left: two.read_u8(1),
             yield_to: two.read_u8(2),
             yield_pending: two.read_u8(1) == 1,
             yield_rank: two.read_u8(5),
-            waited: two.read_u8(3),
+            waited: two.read_u8(5),
             stray_left: two.read_u8(4),
         }
     }
@@ -74,11 +74,11 @@ impl PlannerMemory {
         one.write_u8(self.bump_left, 3);
         memory.words[PLANNER_MEMORY_WORD] = one.word;
         let mut two = BitWriter { word: self.request, used: pass_request::REQUEST_BITS };
-        two.write_u8(self.yield_left, 3);
+        two.write_u8(self.yield_left, 1);
         two.write_u8(self.yield_to, 2);
         two.write_u8(u8::from(self.yield_pending), 1);
         two.write_u8(self.yield_rank, 5);
-        two.write_u8(self.waited, 3);
+        two.write_u8(self.waited, 5);
         two.write_u8(self.stray_left, 4);
         memory.words[OWN_REQUEST_WORD] = two.word;
     }
@@ -144,7 +144,7 @@ mod tests {
             bump: 3,
             bump_left: 7,
             request: 0,
-            yield_left: 6,
+            yield_left: 1,
             yield_to: 2,
             yield_pending: true,
             yield_rank: 31,
@@ -156,7 +156,7 @@ mod tests {
         planner.store(&mut memory);
         assert_eq!(PlannerMemory::from_memory(&memory), planner);
         PlannerMemory { waited: 200, ..planner }.store(&mut memory);
-        assert_eq!(PlannerMemory::from_memory(&memory), PlannerMemory { waited: 7, ..planner });
+        assert_eq!(PlannerMemory::from_memory(&memory), PlannerMemory { waited: 31, ..planner });
         assert_eq!(memory.words[0], 0);
     }
 }

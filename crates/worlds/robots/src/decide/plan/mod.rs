@@ -6,9 +6,10 @@
 //!    ([`Lanes`](sidestep_map::planning::Lanes)). Where the next step is clear the robot takes it.
 //! 2. *Local costmap*: readings that the static map does not explain block places around the robot; so does
 //!    the last contact, for a few decisions.
-//! 3. *Detour*: the cheapest path through the places around it. A blocked place costs some actions
-//!    that grow while the robot waits, because the obstacle may go away; a place off lane costs more while it is
-//!    patient, and little when it goes around something that stays.
+//! 3. *Detour*: the cheapest path through the places around it. On lanes a blocked place costs few actions while the robot
+//!    is patient, because the obstacle may go away, and many when it is not; a place off lane costs more while it is
+//!    patient, and little when it goes around something that stays. Without lanes, a blocked place costs more with each
+//!    decision in vain.
 //! 4. *Requests*: a robot that waits before something asks it to make room ([`PassRequest`]). A robot
 //!    obeys a rank above its own: it takes a free place that it was not asked for, or passes the
 //!    request on with the same rank (priority inheritance, as in PIBT: Okumura et al., "Priority
@@ -50,18 +51,32 @@ const BUMP_DECISIONS: u8 = 2;
 /// Decisions for which a robot keeps out of a place that it was asked to leave; within one the robot
 /// that asked can step into it.
 const KEEP_AWAY_DECISIONS: u8 = 1;
-/// Decisions to wait before something after which a robot with sensors that err tries to go on.
-const WAIT_TIMEOUT_DECISIONS: u8 = 5;
+// The memory has one bit for them, and tells a detour from a wait by the largest number that it can count to.
+const _: () = assert!(KEEP_AWAY_DECISIONS <= 1 && PATIENT_DECISIONS < MAX_WAITED);
 /// Decisions since the last move after which a robot no longer yields to others that might step into
 /// the same place, because in a crowd there is always one.
 const MAX_YIELD_DECISIONS: u8 = 4;
-/// Decisions for which a robot waits before something in the hope that it goes on; then it goes around.
-const PATIENT_DECISIONS: u8 = 4;
-/// The same where sensors or wheels err: queues are slower there, and who leaves one does not find back into it.
-const CAREFUL_PATIENT_DECISIONS: u8 = MAX_WAITED;
-/// Price of a blocked place for a robot that has no patience left: above that of a long detour.
+/// Blocked places up to which a robot has time to be polite and cautious. Among more others it would wait in vain too often.
+/// A thing blocks more places for a larger body, which has the less room beside it: so it is soon among too many.
+const MAX_SPARSE_BLOCKED: usize = 6;
+/// Decisions for which a robot waits before something in the hope that it goes on; then it goes around. Who leaves a queue
+/// meets those that come: with less patience crowded corridors turn into knots.
+const PATIENT_DECISIONS: u8 = 20;
+/// Price of a blocked place for a robot that is patient: a step aside and back costs more, a free lane beside less.
+const PATIENT_BLOCKED_COST: u16 = 4;
+/// The same for a robot that has no patience left: above that of a long detour.
 const IMPATIENT_BLOCKED_COST: u16 = 31;
-/// Extra price of a place that is off lane, because who overtakes a queue meets those that come.
+/// Price of a place beside a blocked one.
+const BESIDE_COST: u16 = 1;
+/// The same where sensors or wheels err and few others are near: a slip or a thing at the far end of its class soon ends in
+/// a contact.
+const CAREFUL_BESIDE_COST: u16 = 6;
+/// Blocked places up to which few others are near. In a crowd most places are beside others, and who keeps a
+/// distance there stands still.
+const MAX_FEW_BLOCKED: usize = 2;
+/// Price of a place where something may be.
+const VAGUE_COST: u16 = 2;
+/// Extra price of a place that is off lane for a robot that is patient, because who overtakes a queue meets those that come.
 const OFF_LANE_COST: u16 = 6;
 /// Decisions for which a robot that has waited long enough goes around what it has waited for, at most.
 const DETOUR_DECISIONS: u8 = 15;
@@ -75,8 +90,8 @@ const AT_LAST_GOAL_RANK: u8 = 1;
 #[derive(Debug)]
 pub struct Planner {
     beam_model: BeamModel,
-    /// Whether sensors or wheels err, so that robots had better keep their distance.
-    is_careful: bool,
+    /// Whether sensors or wheels err, so that what a robot waits for may not be there.
+    may_err: bool,
 }
 
 /// The present goal of a robot.
@@ -105,7 +120,7 @@ impl Planner {
         wheels_err: bool,
     ) -> Self {
         let beam_model = BeamModel::new(walls, size, body, box_size_m);
-        Self { is_careful: wheels_err || !beam_model.are_reliable, beam_model }
+        Self { may_err: wheels_err || !beam_model.are_reliable, beam_model }
     }
 
     /// Returns the next action of a robot.
@@ -128,7 +143,7 @@ impl Planner {
         }
         let view = self.view(goal, percept, &memory, heard.is_some());
         // An obstacle ahead is believed to be there once more, because a sensor may miss it.
-        let may_miss = !self.beam_model.are_reliable;
+        let may_miss = !self.beam_model.are_reliable && view.blocked.len() <= MAX_SPARSE_BLOCKED;
         if may_miss && view.is_blocked(view.heading) && memory.bump_left == 0 {
             memory.bump = view.heading;
             memory.bump_left = BUMP_DECISIONS;
@@ -185,7 +200,7 @@ impl Planner {
             heading: percept.heading,
             blocked,
             vague,
-            is_careful: self.is_careful,
+            may_err: self.may_err,
             is_done: goal.is_done,
             is_alone,
         }
@@ -412,7 +427,7 @@ fn travel(
     let Some(direction) = direction else { return STAY };
     if !memory.is_on_detour()
         && view.field.lanes().is_some()
-        && memory.waited >= patient_decisions(view)
+        && memory.waited >= PATIENT_DECISIONS
         && !view.descends(direction)
     {
         memory.waited = MAX_WAITED;
@@ -424,55 +439,50 @@ fn travel(
     }
     if view.is_blocked(direction) {
         memory.waited += 1;
-        // Sensors that err may see something in a narrow gap forever. One decision in four tries to
-        // go on, so that of two robots that wait for each other mostly one moves.
-        let has_waited = view.is_careful && memory.waited > WAIT_TIMEOUT_DECISIONS;
+        // Sensors that err may see something in a narrow gap forever. When its patience is over, one decision in four tries
+        // to go on, so that of two robots that wait for each other mostly one moves.
+        let has_waited = view.may_err && memory.waited > PATIENT_DECISIONS;
         let tries = has_waited && draws.uniform_below(4) == 0;
         return if tries { FORWARD } else { STAY };
     }
-    if memory.waited < MAX_YIELD_DECISIONS && should_yield(view, direction, draws) {
+    let may_yield = memory.waited < MAX_YIELD_DECISIONS && view.blocked.len() <= MAX_SPARSE_BLOCKED;
+    if may_yield && should_yield(view, direction, draws) {
         memory.waited += 1;
         return STAY;
     }
     FORWARD
 }
 
-/// Returns the prices of a detour, which depend on how long the robot has waited, and on whether it
-/// has to allow for errors.
+/// Returns the prices of a detour, which depend on how long the robot has waited, on whether it has to allow for errors, and
+/// on whether it is in a crowd.
 fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
     let moved = memory.moved.checked_sub(1);
-    // Where sensors or wheels err, a slip or a thing at the far end of its class soon ends in a contact.
-    let beside = if view.is_careful { 6 } else { 1 };
-    let vague = if view.is_careful { 5 } else { 1 };
-    let has_gained =
-        moved.is_some_and(|moved| view.rise((moved + 2) % 4).is_some_and(|rise| rise > 0));
-    // Where nothing errs robots see enough to keep to every change of course.
-    let is_sidestep = !view.is_careful || moved.is_some() && !has_gained;
-    let is_patient = memory.waited < patient_decisions(view);
+    let is_patient = memory.waited < PATIENT_DECISIONS;
     let off_lane = if is_patient { OFF_LANE_COST } else { 1 };
     let blocked = if view.field.lanes().is_none() {
         // At first cheaper than most detours, because the obstacle may go away; each decision in vain
         // makes a longer detour worth it.
-        3 + 4 * u16::from(memory.waited)
+        (3 + 4 * u16::from(memory.waited)).min(IMPATIENT_BLOCKED_COST)
     } else if is_patient {
-        3 + u16::from(memory.waited)
+        PATIENT_BLOCKED_COST
     } else {
         IMPATIENT_BLOCKED_COST
     };
+    let is_in_crowd = view.blocked.len() > MAX_FEW_BLOCKED;
+    let beside = if view.may_err && !is_in_crowd { CAREFUL_BESIDE_COST } else { BESIDE_COST };
+    let has_gained =
+        moved.is_some_and(|moved| view.rise((moved + 2) % 4).is_some_and(|rise| rise > 0));
+    // Where nothing errs robots see enough to keep to every change of course.
+    let is_sidestep = !view.may_err || moved.is_some() && !has_gained;
     StepCosts {
         blocked,
         off_lane,
         is_on_detour: memory.is_on_detour(),
         beside,
-        vague,
+        vague: VAGUE_COST,
         moved,
         is_sidestep,
     }
-}
-
-/// Returns the decisions for which a robot waits before something; then it goes around.
-fn patient_decisions(view: &LocalView<'_>) -> u8 {
-    if view.is_careful { CAREFUL_PATIENT_DECISIONS } else { PATIENT_DECISIONS }
 }
 
 /// Returns whether to let another robot pass that may step into the same place: one from the

@@ -60,8 +60,9 @@ fn a_shuttle_gets_past_a_parked_body_through_a_gap_of_one_box() {
         let mut run = start(&past_a_parked_body(size, sensors), 1);
         advance(&mut run, 10_000);
         let total = run.metrics().total;
-        // Beside six boxes the lanes are six boxes apart, and each way leads from one to the other.
-        let expected = if size == 6 { 80 } else { 100 };
+        // Beside six boxes the lanes are six boxes apart, each way leads from one to the other, and the robot waits before
+        // the body more than once until it goes around.
+        let expected = if size == 6 { 60 } else { 100 };
         assert!(total.trips >= expected, "{size} {sensors}: {total:?}");
         assert!(total.contacts <= 100, "{size} {sensors}: {total:?}");
         assert!(sensors.is_empty() || total.contacts == 0, "{size}: {total:?}");
