@@ -1,8 +1,9 @@
 //! Whether robots arrive where they meet: crowds that go to and fro through passages with room for two bodies.
 //!
-//! `cargo bench -p sidestep --bench traffic [-- CASES [SEEDS]]` flies each case whose name contains one of the words of
-//! `CASES` (separated by commas; all without) with seeds 1 to `SEEDS` (100) for 8,000 cycles, and prints how many seeds
-//! *stop*: no trip ends in the last 2,000 cycles.
+//! `cargo bench -p sidestep --bench traffic [-- CASES [SEEDS [POLICY [METHOD]]]]` flies each case whose name contains one of
+//! the words of `CASES` (separated by commas; all without) with seeds 1 to `SEEDS` (100) for 8,000 cycles, and prints how
+//! many seeds *stop*: no trip ends in the last 2,000 cycles. Conflicts are resolved by `POLICY` (random). With a `METHOD`,
+//! such as pibt, a planner leads all robots as one team, which is the bound for robots that decide alone.
 
 use sidestep::kernel::workers::available_workers;
 use sidestep::scenario::Source;
@@ -36,20 +37,49 @@ struct Case {
     teams: Vec<Team>,
 }
 
+/// What all runs have in common.
+struct Setup {
+    seeds: u64,
+    conflict_policy: String,
+    /// The planner that leads all robots; none for robots that decide alone.
+    method: Option<String>,
+}
+
+impl Setup {
+    /// Reads the arguments of the command line after the words that choose cases.
+    fn from_arguments(mut arguments: impl Iterator<Item = String>) -> Self {
+        let seeds = arguments.next();
+        Self {
+            seeds: seeds.map_or(DEFAULT_SEEDS, |seeds| seeds.parse().expect("SEEDS is a number")),
+            conflict_policy: arguments.next().unwrap_or_else(|| "random".to_owned()),
+            method: arguments.next(),
+        }
+    }
+}
+
 impl Case {
-    fn source(&self, seed: u64) -> Source {
+    fn source(&self, setup: &Setup, seed: u64) -> Source {
         let rows = self.map.iter().map(|row| String::from_utf8_lossy(row).into_owned() + "\n");
         let map: String = rows.collect();
         let regime = self.regime;
+        let policy = &setup.conflict_policy;
         let mut text = format!(
-            "format = 1\nworld = \"robots\"\nseed = {seed}\nregime = \"{regime}\"\n[map]\nascii = \"\"\"\n{map}\"\"\"\n"
+            "format = 1\nworld = \"robots\"\nseed = {seed}\nregime = \"{regime}\"\nconflict_policy = \"{policy}\"\n\
+             [map]\nascii = \"\"\"\n{map}\"\"\"\n"
         );
-        for Team { robots, start, ends: [a, b] } in &self.teams {
+        for (number, Team { robots, start, ends: [a, b] }) in self.teams.iter().enumerate() {
+            let leader = match &setup.method {
+                None => String::new(),
+                Some(method) if number == 0 => {
+                    format!("name = \"all\"\nplanner = {{ method = \"{method}\" }}\n")
+                }
+                Some(_) => "team = \"all\"\n".to_owned(),
+            };
             let size = self.size;
             let region = start.map_or(String::new(), |start| format!("region = {start:?}\n"));
             text += &format!(
                 "[[robots]]\ncount = {robots}\nsize = {size}\n{region}sensors = [\"sonar-ring\"]\neffector = \"nomad\"\n\
-                 behaviour = {{ kind = \"shuttle\", a = {a:?}, b = {b:?} }}\n"
+                 behaviour = {{ kind = \"shuttle\", a = {a:?}, b = {b:?} }}\n{leader}"
             );
         }
         Source::new(self.name.as_str(), text, "")
@@ -182,11 +212,12 @@ fn advance_to(run: &mut RobotsRun, cycle: u64) {
 }
 
 /// Returns the outcomes of the seeds from 1 on, each flown by one worker.
-fn fly_seeds(case: &Case, seeds: u64) -> Vec<Outcome> {
+fn fly_seeds(case: &Case, setup: &Setup) -> Vec<Outcome> {
     let next = AtomicU64::new(1);
     let work = || {
-        let take = || Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&seed| seed <= seeds);
-        let flown = std::iter::from_fn(take).map(|seed| (seed, fly(&case.source(seed))));
+        let take =
+            || Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&seed| seed <= setup.seeds);
+        let flown = std::iter::from_fn(take).map(|seed| (seed, fly(&case.source(setup, seed))));
         flown.collect::<Vec<_>>()
     };
     let mut outcomes: Vec<(u64, Outcome)> = std::thread::scope(|scope| {
@@ -200,17 +231,19 @@ fn fly_seeds(case: &Case, seeds: u64) -> Vec<Outcome> {
 fn main() {
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     let words = arguments.next().unwrap_or_default();
-    let seeds =
-        arguments.next().map_or(DEFAULT_SEEDS, |seeds| seeds.parse().expect("SEEDS is a number"));
+    let setup = Setup::from_arguments(arguments);
     println!(
-        "{seeds} seeds of {CYCLES} cycles; per 1,000 robot-cycles: trips (there and back), contacts"
+        "{} seeds of {CYCLES} cycles, conflicts {}, led by {}; per 1,000 robot-cycles: trips (there and back), contacts",
+        setup.seeds,
+        setup.conflict_policy,
+        setup.method.as_deref().unwrap_or("nobody")
     );
     println!("{:32} {:>7} {:>7} {:>9}  seeds that stop", "case", "robots", "trips", "contacts");
     let is_wanted = |case: &Case| words.split(',').any(|word| case.name.contains(word));
     let mut stopped_runs = 0;
     let mut runs = 0;
     for case in cases().into_iter().filter(is_wanted) {
-        let outcomes = fly_seeds(&case, seeds);
+        let outcomes = fly_seeds(&case, &setup);
         let sum = |count: fn(&Outcome) -> u64| outcomes.iter().map(count).sum::<u64>() as f64;
         let per_thousand = 1e3 / sum(|outcome| outcome.actions);
         let stopped: Vec<usize> = (1..)

@@ -57,7 +57,7 @@ pub fn single_robot(compiled: &Compiled) -> Result<SingleRobot, InputError> {
     if !world.planner_teams.is_empty() {
         let cause =
             "a planner leads the robot, and the states of a chain do not say what that remembers";
-        let remedy = "leave out [robots.planner]";
+        let remedy = "leave out `planner` and `team` of the robots";
         return Err(InputError::new(source_name(compiled), cause, remedy));
     }
     if body.action_cycles > 1 {

@@ -280,9 +280,9 @@ pub(super) struct TransitionSection {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RobotSection {
-    /// A name for people.
-    #[serde(default, rename = "name")]
-    _name: String,
+    /// A name for people, and for the sections of its team.
+    #[serde(default)]
+    pub(super) name: String,
     /// Kind of the robots.
     #[serde(default = "robot_kind")]
     pub(super) kind: Spanned<String>,
@@ -302,6 +302,8 @@ pub(super) struct RobotSection {
     pub(super) effector: Option<Spanned<String>>,
     pub(super) behaviour: Option<Spanned<BehaviourSection>>,
     pub(super) planner: Option<Spanned<PlannerSection>>,
+    /// Name of the section whose planner leads these robots, too.
+    pub(super) team: Option<Spanned<String>>,
     pub(super) tasks: Option<Spanned<TaskSection>>,
 }
 
@@ -336,7 +338,8 @@ pub(super) enum TaskPolicyName {
     Optimal,
 }
 
-/// The planner of a team with common knowledge: it chooses the actions of all robots of the section.
+/// The planner of a team with common knowledge: it chooses the actions of all robots of the section, and of those whose
+/// `team` is its name.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PlannerSection {

@@ -233,10 +233,15 @@ fn robots(file: &Value) -> Vec<Value> {
         Value::Null => &[],
         one => std::slice::from_ref(one),
     };
-    sections.iter().map(robot_section).collect()
+    sections.iter().map(|section| robot_section(section, sections)).collect()
 }
 
-fn robot_section(section: &Value) -> Value {
+/// Returns the entry of one of several sections.
+fn robot_section(section: &Value, sections: &[Value]) -> Value {
+    let has_planner = |one: &&Value| one["planner"].is_object();
+    let of_team = sections.iter().filter(has_planner).find(|one| one["name"] == section["team"]);
+    let leading =
+        if section["team"].is_null() { Some(section).filter(has_planner) } else { of_team };
     let places = section["at"].as_array().map(|at| at.len().into());
     let default_behaviour = if section["tasks"].is_null() { "wander" } else { "tasks" };
     json!({
@@ -248,11 +253,12 @@ fn robot_section(section: &Value) -> Value {
         "sensors": value_or(&section["sensors"], json!([])),
         "effector": value_or(&section["effector"], "perfect".into()),
         "behaviour": value_or(&section["behaviour"]["kind"], default_behaviour.into()),
-        "planner": section["planner"].as_object().map(|_| planner_entry(&section["planner"])),
+        "team": section["team"],
+        "planner": leading.map(|leading| planner_entry(&leading["planner"])),
     })
 }
 
-/// Returns who leads the robots of a section. A planner that knows the true places is privileged.
+/// Returns who leads robots. A planner that knows the true places is privileged.
 fn planner_entry(planner: &Value) -> Value {
     let places = value_or(&planner["places"], "true".into());
     let is_privileged = places == "true";
@@ -375,8 +381,13 @@ fn robots_text(robots: &Value) -> String {
             n => format!("{n} cycles"),
         },
         size = robots["size_boxes"],
-        planner = planner_text(&robots["planner"]),
+        planner = planner_text(&robots["planner"]) + &team_text(&robots["team"]),
     )
+}
+
+/// Returns in words that robots belong to the team of another section; nothing for those that do not.
+fn team_text(team: &Value) -> String {
+    team.as_str().map_or(String::new(), |team| format!(", in the team of `{team}`"))
 }
 
 /// Returns who leads robots in words, after a comma; nothing for those that decide alone.

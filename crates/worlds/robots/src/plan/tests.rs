@@ -326,3 +326,46 @@ fn a_full_corridor_does_not_stand_still_whatever_the_conflict_policy() {
         assert_eq!(metrics.total.contacts, 0, "{policy}");
     }
 }
+
+/// Returns robots at these places that go to and fro between the ends of a corridor of two rows, as a section.
+fn corridor_section(at: &str, planner: &str) -> String {
+    format!(
+        "[[robots]]\nat = {at}\neffector = \"w\"\nperiod = 2\nphase = 1\n\
+         behaviour = {{ kind = \"shuttle\", a = [0, 0, 2, 2], b = [10, 0, 2, 2] }}\n{planner}\n"
+    )
+}
+
+/// Returns a corridor with sections of robots.
+fn corridor(sections: &[String]) -> String {
+    format!(
+        "format = 1\nworld = \"robots\"\nconflict_policy = \"simultaneous\"\n\
+         map.ascii = \"\"\"\n............\n............\n\"\"\"\n{}\
+         [effectors.w]\nforward = [{{ p = 0.9, path = \"F\" }}, {{ p = 0.1 }}]\n",
+        sections.concat()
+    )
+}
+
+#[test]
+fn two_sections_of_one_team_are_led_as_one_section_of_all_their_robots() {
+    for method in [
+        "\"pibt\"",
+        "\"lacam\", budget_expansions = 50",
+        "\"pibt\", places = \"believed\", report_every = 3",
+    ] {
+        let named = format!("name = \"first\"\nplanner = {{ method = {method} }}");
+        let places = ["[[0, 0, 0], [3, 1, 2], [5, 0, 0]]", "[[7, 1, 2], [9, 0, 1], [11, 1, 3]]"];
+        let all = "[[0, 0, 0], [3, 1, 2], [5, 0, 0], [7, 1, 2], [9, 0, 1], [11, 1, 3]]";
+        let apart =
+            [corridor_section(places[0], &named), corridor_section(places[1], "team = \"first\"")];
+        let mut one = run(&corridor(&[corridor_section(all, &named)]), 1);
+        let mut two = run(&corridor(&apart), 2);
+        one.advance(600);
+        two.advance(600);
+        assert!(one.metrics().total.trips > 0, "{method}");
+        let places = |run: &RobotsRun| -> Vec<_> {
+            (0..6).map(|id| run.state().body(id).position().word()).collect()
+        };
+        assert_eq!(places(&one), places(&two), "{method}");
+        assert_eq!(one.metrics().total.trips, two.metrics().total.trips, "{method}");
+    }
+}

@@ -17,6 +17,7 @@ use self::known_tables::{KnownTables, known_tables};
 use self::map::{LoadedMap, load_map, padded};
 use self::placer::Placement;
 pub(super) use self::placer::Placer;
+use self::planner::JoinableTeam;
 use super::kinds::Kinds;
 use super::located_section::LocatedSection;
 use super::placement_grid::{PlacementError, PlacementGrid};
@@ -144,6 +145,10 @@ struct Compiler<'a> {
     /// Largest distance in boxes from a body to a box that it claims.
     reach: u32,
     remarks: Vec<Remark>,
+    /// The teams of the sections with a planner so far.
+    teams: Vec<JoinableTeam>,
+    /// The team of the section before, by its place in that list; none where no planner leads it.
+    last_team: Option<usize>,
 }
 
 impl<'a> Compiler<'a> {
@@ -183,6 +188,8 @@ impl<'a> Compiler<'a> {
             border,
             reach: 0,
             remarks,
+            teams: Vec::new(),
+            last_team: None,
             map,
             office_doors,
             head,

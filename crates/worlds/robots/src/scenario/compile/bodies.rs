@@ -17,10 +17,18 @@ pub(super) struct BodyGroup {
     pub(super) period: u32,
     pub(super) phase: Option<u32>,
     pub(super) action_cycles: u32,
-    /// Who leads them, if a planner does.
-    pub(super) leader: Option<TeamLeader>,
+    /// The team to which they belong, if a planner leads them.
+    pub(super) team: Option<GroupTeam>,
     /// What they carry out, led by the planner.
     pub(super) tasks: Option<Arc<TeamTasks>>,
+}
+
+/// The team of a group of robots.
+#[derive(Debug)]
+pub(super) struct GroupTeam {
+    /// Equal for the groups of one team.
+    pub(super) number: usize,
+    pub(super) leader: TeamLeader,
 }
 
 impl BodyGroup {

@@ -233,7 +233,11 @@ fn row_remarks(name: &str, at: &LocatedSection<SensorSection>) -> Vec<Remark> {
 /// Returns remarks on a section of robots whose behavior lacks what it needs, or does not use what it has.
 fn behaviour_remarks(given: &Given<'_>, k: usize, s: &RobotSection) -> Vec<Remark> {
     let mut remarks = Vec::new();
-    if s.count.as_ref().is_some_and(|count| *count.get_ref() == 0) {
+    let is_joined =
+        |other: &RobotSection| other.team.as_ref().is_some_and(|team| *team.get_ref() == s.name);
+    let leads_others =
+        s.planner.is_some() && given.file.robots.0.iter().any(|other| is_joined(other.get_ref()));
+    if s.count.as_ref().is_some_and(|count| *count.get_ref() == 0) && !leads_others {
         remarks.push(Remark::note(format!("robots.{k}"), "has no effect: count = 0"));
         return remarks;
     }
@@ -266,7 +270,8 @@ fn behaviour_remarks(given: &Given<'_>, k: usize, s: &RobotSection) -> Vec<Remar
         let words = "has no effect: it avoids what sensors report, and the robots have none";
         remarks.push(Remark::warning(format!("{key}.avoidance"), words));
     }
-    if s.planner.is_some() && !s.sensors.is_empty() && !given.file.record.calibration {
+    let is_led = s.planner.is_some() || s.team.is_some();
+    if is_led && !s.sensors.is_empty() && !given.file.record.calibration {
         let words = "no effect on what the robots do: their planner asks no sensor";
         remarks.push(Remark::note(format!("robots.{k}.sensors"), words));
         return remarks;

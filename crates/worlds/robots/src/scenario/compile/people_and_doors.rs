@@ -36,7 +36,7 @@ impl Compiler<'_> {
             period: period_cycles(s.period),
             phase: s.phase,
             action_cycles: 1,
-            leader: None,
+            team: None,
             tasks: None,
         })
     }
@@ -66,7 +66,7 @@ impl Compiler<'_> {
             period: 1,
             phase: Some(0),
             action_cycles: 1,
-            leader: None,
+            team: None,
             tasks: None,
         })
     }

@@ -33,16 +33,22 @@ impl Placer {
         first_ids
     }
 
-    /// Returns the groups of robots that a planner leads.
+    /// Returns the robots that planners lead, by their teams; the sections of one follow each other.
     pub(super) fn planner_teams(&self) -> Vec<Team> {
-        let mut teams = Vec::new();
+        let mut teams: Vec<(usize, Team)> = Vec::new();
         for (group, first) in self.groups.iter().zip(self.first_ids()) {
-            let leader = group.leader.clone().filter(|_| group.count > 0);
-            let robots = first..first + group.count as EntityId;
-            let tasks = group.tasks.clone();
-            teams.extend(leader.map(|leader| Team { robots, leader, tasks }));
+            let Some(of_group) = group.team.as_ref().filter(|_| group.count > 0) else { continue };
+            let end = first + group.count as EntityId;
+            match teams.last_mut().filter(|(number, _)| *number == of_group.number) {
+                Some((_, team)) => team.robots.end = end,
+                None => {
+                    let leader = of_group.leader.clone();
+                    let team = Team { robots: first..end, leader, tasks: group.tasks.clone() };
+                    teams.push((of_group.number, team));
+                }
+            }
         }
-        teams
+        teams.into_iter().map(|(_, team)| team).collect()
     }
 
     /// Places all bodies, with the draws of `streams`.

@@ -3,7 +3,8 @@
 use super::super::{
     KnownPlaces, PlanExecutor, PlannerMethod, PlannerSection, RobotSection, StartPose,
 };
-use super::bodies::{BodyGroup, action_cycles, period_cycles};
+use super::bodies::{BodyGroup, GroupTeam, action_cycles, period_cycles};
+use super::random::UnlocatedError;
 use super::robots::side_boxes;
 use super::*;
 use crate::belief::Reports;
@@ -14,6 +15,18 @@ use sidestep_kernel::distr::Bernoulli;
 use sidestep_planners::{Executor, Method, TeamPlannerConfig, plan_file};
 use sidestep_scenario::file::read_text;
 use std::path::PathBuf;
+
+/// The team of a section with a planner, as far as other sections can join it.
+pub(super) struct JoinableTeam {
+    name: String,
+    leader: TeamLeader,
+    size: u32,
+    period: u32,
+    phase: Option<u32>,
+    action_cycles: u32,
+    method: PlannerMethod,
+    has_tasks: bool,
+}
 
 /// Behaviors that have goals, which is all that a planner asks of them.
 const WITH_GOALS: [&str; 2] = ["shuttle", "goto"];
@@ -43,16 +56,95 @@ const MAX_ORDERED_ACTIONS: u32 = 10_000;
 const MAX_PLAN_BYTES: u64 = 100 << 20;
 
 impl Compiler<'_> {
-    /// Returns who leads the robots of a section, and refuses those that no planner can lead.
-    pub(super) fn leader(
-        &self,
+    /// Returns the team of the robots of a section, and refuses those that no planner can lead.
+    pub(super) fn team(
+        &mut self,
         s: &RobotSection,
         effector: &EffectorModel,
-    ) -> Result<Option<TeamLeader>, InputError> {
-        let Some(planner) = &s.planner else { return Ok(None) };
+    ) -> Result<Option<GroupTeam>, InputError> {
+        let number = match (&s.planner, &s.team) {
+            (None, None) => None,
+            (Some(planner), None) => {
+                let leader = self.leader(s, planner, effector)?;
+                self.teams.push(JoinableTeam::new(s, planner.get_ref(), leader));
+                Some(self.teams.len() - 1)
+            }
+            (None, Some(team)) => Some(self.team_of_section_before(s, team, effector)?),
+            (Some(_), Some(team)) => {
+                let cause =
+                    "the section has a planner of its own and belongs to the team of another one";
+                return Err(self.source.error(
+                    team.span(),
+                    cause,
+                    "leave out `team`, or `planner`",
+                ));
+            }
+        };
+        self.last_team = number;
+        Ok(number.map(|number| GroupTeam { number, leader: self.teams[number].leader.clone() }))
+    }
+
+    /// Returns the team that a section names, by its number. Its robots must be like those of the section with the planner.
+    fn team_of_section_before(
+        &self,
+        s: &RobotSection,
+        team: &Spanned<String>,
+        effector: &EffectorModel,
+    ) -> Result<usize, InputError> {
+        let refuse =
+            |cause: String, remedy: String| Err(self.source.error(team.span(), cause, remedy));
+        let name = team.get_ref();
+        if name.is_empty() {
+            let remedy = "give the name of the section whose planner leads these robots, or leave out `team`";
+            return refuse("the team has no name".to_string(), remedy.to_string());
+        }
+        let mut namesakes =
+            (0..self.teams.len()).filter(|&number| self.teams[number].name == *name);
+        let Some(number) = namesakes.next() else {
+            let cause = format!("no section before this one has a planner and the name `{name}`");
+            return refuse(cause, self.remedy_for_unknown_team(name));
+        };
+        if namesakes.next().is_some() {
+            let cause = format!("several sections have a planner and the name `{name}`");
+            return refuse(cause, "give each of them another name".to_string());
+        }
+        if self.last_team != Some(number) {
+            let cause = format!("another section stands between this one and its team `{name}`");
+            return refuse(
+                cause,
+                "move this section up, behind the others of its team".to_string(),
+            );
+        }
+        if let Some((cause, remedy)) = self.teams[number].unlike(s) {
+            return refuse(cause, remedy);
+        }
+        self.check_planned_robots(s, effector, &team.span(), "`team`")?;
+        Ok(number)
+    }
+
+    /// Returns what to do where no section before has a planner and the name.
+    fn remedy_for_unknown_team(&self, name: &str) -> String {
+        let names = self.teams.iter().map(|team| team.name.as_str());
+        let names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
+        if names.is_empty() {
+            format!(
+                "add name = {name:?} to the section with the planner, and let it stand before this one"
+            )
+        } else {
+            suggestion(name, &names)
+        }
+    }
+
+    /// Returns who leads the robots of a section with a planner, and refuses those that it cannot lead.
+    fn leader(
+        &self,
+        s: &RobotSection,
+        planner: &Spanned<PlannerSection>,
+        effector: &EffectorModel,
+    ) -> Result<TeamLeader, InputError> {
         let span = planner.span();
         let planner = planner.get_ref();
-        self.check_planned_robots(s, effector, &span)?;
+        self.check_planned_robots(s, effector, &span, "the planner")?;
         self.check_planner_keys(planner)?;
         let config = TeamPlannerConfig {
             method: self.planner_method(planner, &span)?,
@@ -63,11 +155,8 @@ impl Compiler<'_> {
             action_steps: action_cycles(s),
             seed: Seed(0),
         };
-        Ok(Some(TeamLeader {
-            config,
-            orders: orders(planner),
-            reports: reports(planner, action_cycles(s)),
-        }))
+        let reports = reports(planner, action_cycles(s));
+        Ok(TeamLeader { config, orders: orders(planner), reports })
     }
 
     fn planner_method(
@@ -229,14 +318,15 @@ impl Compiler<'_> {
         Ok(group)
     }
 
-    /// Refuses robots that no planner can lead.
+    /// Refuses robots that no planner can lead; `key` is what says that one does.
     fn check_planned_robots(
         &self,
         s: &RobotSection,
         effector: &EffectorModel,
         span: &Range<usize>,
+        key: &str,
     ) -> Result<(), InputError> {
-        self.check_planned_behaviour(s, span.clone())?;
+        self.check_planned_behaviour(s, span.clone(), key)?;
         if period_cycles(s.period) > 1 && s.phase.is_none() {
             let cause = "the planner leads robots whose period starts in cycles that are drawn";
             let remedy = "add phase = 0, because a team acts in the same cycles";
@@ -271,6 +361,7 @@ impl Compiler<'_> {
         &self,
         s: &RobotSection,
         span: Range<usize>,
+        key: &str,
     ) -> Result<(), InputError> {
         // A list of starts and goals is the behavior `goto`, and errands are goals.
         if s.scen.is_some() || s.tasks.is_some() {
@@ -282,15 +373,80 @@ impl Compiler<'_> {
             let cause = format!(
                 "the planner leads robots that go somewhere, and the behavior of these is `{kind}`"
             );
-            let remedy = "give them behaviour = { kind = \"shuttle\", a = [...], b = [...] } or { kind = \"goto\", goals = [...] }, \
-                 or leave out the planner";
+            let remedy = format!(
+                "give them behaviour = {{ kind = \"shuttle\", a = [...], b = [...] }} or {{ kind = \"goto\", goals = [...] }}, \
+                 or leave out {key}"
+            );
             return Err(self.source.error(span, cause, remedy));
         }
         if behaviour.is_some_and(|b| b.avoidance.is_some()) {
             let cause = "robots with a planner have `avoidance`, which is the way of robots that decide alone";
-            return Err(self.source.error(span, cause, "leave out `avoidance`, or the planner"));
+            let remedy = format!("leave out `avoidance`, or {key}");
+            return Err(self.source.error(span, cause, remedy));
         }
         Ok(())
+    }
+}
+
+impl JoinableTeam {
+    fn new(s: &RobotSection, planner: &PlannerSection, leader: TeamLeader) -> Self {
+        Self {
+            name: s.name.clone(),
+            leader,
+            size: side_boxes(s),
+            period: period_cycles(s.period),
+            phase: s.phase,
+            action_cycles: action_cycles(s),
+            method: planner.method,
+            has_tasks: s.tasks.is_some(),
+        }
+    }
+
+    /// Returns why the robots of another section cannot be in the same team, and a remedy; none for those that can.
+    fn unlike(&self, s: &RobotSection) -> Option<UnlocatedError> {
+        let name = &self.name;
+        match self.method {
+            PlannerMethod::File => {
+                let cause =
+                    format!("the plan in the file of `{name}` leads the robots of one section");
+                let remedy =
+                    "replace `team` by planner = { method = \"file\", file = \"NAME.plan\" }";
+                return Some((cause, remedy.to_string()));
+            }
+            PlannerMethod::External => {
+                let cause = format!(
+                    "the program that leads `{name}` observes and orders the robots of one section"
+                );
+                let remedy = "replace `team` by planner = { method = \"external\" }";
+                return Some((cause, remedy.to_string()));
+            }
+            _ => {}
+        }
+        if self.has_tasks || s.tasks.is_some() {
+            let cause = "robots with tasks are in a team of several sections";
+            let remedy =
+                "leave out `team`, and put all robots that share the tasks into one section";
+            return Some((cause.to_string(), remedy.to_string()));
+        }
+        if period_cycles(s.period) > 1 && s.phase.is_none() {
+            // Without one, it would be drawn: the check of all robots with a planner says so.
+            return None;
+        }
+        let phase = |phase: Option<u32>| phase.unwrap_or(0);
+        let numbers = [
+            ("size", side_boxes(s), self.size),
+            ("period", period_cycles(s.period), self.period),
+            ("phase", phase(s.phase), phase(self.phase)),
+            ("action_cycles", action_cycles(s), self.action_cycles),
+        ];
+        let (key, own, of_team) = numbers.into_iter().find(|(_, own, of_team)| own != of_team)?;
+        let cause = format!(
+            "these robots have {key} = {own}, and those of their team `{name}` have {of_team}"
+        );
+        Some((
+            cause,
+            format!("give {key} = {of_team}, or replace `team` by a planner of their own"),
+        ))
     }
 }
 
@@ -380,5 +536,50 @@ mod tests {
             "{GOES}{planner}effector = \"fast\"\n[effectors.fast]\nforward = [{{ p = 1.0, path = \"FF\" }}]\n"
         );
         assert_refused(&fast, "`forward` of effector `fast`", "path = \"F\"");
+    }
+
+    #[test]
+    fn a_section_that_cannot_be_in_the_team_it_names_is_refused_with_a_remedy() {
+        let planner = "planner = { method = \"pibt\" }\n";
+        let first = format!("name = \"first\"\n{GOES}{planner}");
+        let joining =
+            |keys: &str| format!("{first}[[robots]]\ncount = 1\n{GOES}team = \"first\"\n{keys}");
+        assert!(compiled(&joining("")).is_ok());
+        let refused = |robots: &str, cause: &str, remedy: &str| {
+            let error = compiled(robots).map(|_| ()).expect_err(robots);
+            let line =
+                6 + robots.lines().position(|line| line.contains("team =")).expect("has one");
+            assert_eq!(error.line_and_column().map(|at| at.0), Some(line), "{error}");
+            assert!(error.cause().contains(cause), "{error}");
+            assert!(error.remedy().contains(remedy), "{error}");
+        };
+        refused(&joining(planner), "planner of its own", "leave out `team`");
+        refused(&joining("size = 2\n"), "size = 2", "size = 1");
+        refused(&joining("action_cycles = 3\n"), "action_cycles = 3", "action_cycles = 1");
+        refused(
+            &joining("").replace("team = \"first", "team = \"frist"),
+            "the name `frist`",
+            "first",
+        );
+        refused(
+            &joining("").replace("name = \"first\"\n", ""),
+            "the name `first`",
+            "name = \"first\"",
+        );
+        let between = format!("[[robots]]\ncount = 1\n{GOES}[[robots]]\ncount = 1\n{GOES}team = ");
+        let apart = joining("").replace(&format!("[[robots]]\ncount = 1\n{GOES}team = "), &between);
+        refused(&apart, "stands between", "move this section");
+        refused(
+            &joining("").replace("team = \"first\"", "team = \"\""),
+            "no name",
+            "leave out `team`",
+        );
+        let method = |method: &str| joining("").replace("\"pibt\"", method);
+        refused(&method("\"external\""), "the program", "replace `team`");
+        refused(&joining("period = 2\n"), "drawn", "phase = 0");
+        let tasks = joining("").replace(GOES, "tasks = { list = [[[0, 0], [5, 0]]] }\n");
+        refused(&tasks, "tasks", "one section");
+        let wanders = joining("").replacen(&format!("{GOES}team"), "team", 1);
+        refused(&wanders, "`wander`", "kind = \"shuttle\"");
     }
 }

@@ -21,9 +21,9 @@ impl Compiler<'_> {
         let count = self.body_count(s.count.as_ref(), &s.at, &span)?;
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let leader = self.leader(s, &body.effector)?;
-        let has_planner = leader.is_some();
-        let team_orders = leader.as_ref().and_then(|leader| leader.orders);
+        let team = self.team(s, &body.effector)?;
+        let has_planner = team.is_some();
+        let team_orders = team.as_ref().and_then(|team| team.leader.orders);
         let robot = RobotKind { size, body: &body, has_planner };
         let tasks = self.tasks(s, count)?.map(Arc::new);
         let behaviour = match tasks {
@@ -43,7 +43,7 @@ impl Compiler<'_> {
             period: period_cycles(s.period),
             phase: s.phase,
             action_cycles: action_cycles(s),
-            leader,
+            team,
             tasks,
         };
         self.start_as_planned(s, group)
@@ -67,9 +67,9 @@ impl Compiler<'_> {
         }
         let size = side_boxes(s);
         let body = Arc::new(self.robot_body(s, size)?);
-        let leader = self.leader(s, &body.effector)?;
-        let has_planner = leader.is_some();
-        let team_orders = leader.as_ref().and_then(|leader| leader.orders);
+        let team = self.team(s, &body.effector)?;
+        let has_planner = team.is_some();
+        let team_orders = team.as_ref().and_then(|team| team.leader.orders);
         let routes = RoutePlanner::new(&self.map, size, None, &body, has_planner);
         let alone = (!has_planner).then(|| self.avoidance(None, &routes, &body));
         let mut places = Vec::new();
@@ -93,7 +93,7 @@ impl Compiler<'_> {
             period: period_cycles(s.period),
             phase: s.phase,
             action_cycles: action_cycles(s),
-            leader,
+            team,
             tasks: None,
         };
         self.start_as_planned(s, group)
