@@ -347,6 +347,11 @@ pub(crate) fn listed_name(table: &str, part: &str) -> String {
     format!("{table}/{part}")
 }
 
+/// Returns the error of a run whose folder with the tables is gone.
+fn tables_deleted(parent: &Path) -> RecordError {
+    RecordError::new(parent.display(), format!("the folder of the tables {DELETED_TABLE}"))
+}
+
 /// Returns the folder of a table to its state when the recorder was sealed at `cycle`, and the list of files with it.
 fn rewind(
     parent: &Path,
@@ -365,16 +370,16 @@ fn rewind(
         match error.kind() {
             io::ErrorKind::AlreadyExists => {}
             // The folder was there when the run was created: it is no mistake in the path that was given.
-            io::ErrorKind::NotFound => {
-                let cause = format!("the folder of the tables {DELETED_TABLE}");
-                return Err(RecordError::new(parent.display(), cause));
-            }
+            io::ErrorKind::NotFound => return Err(tables_deleted(parent)),
             _ => return Err(RecordError::new(partial.display(), error)),
         }
     }
     // This check must come before anything is deleted.
-    check_sealed(&partial, cycle)?;
-    for path in disk::list(&partial)? {
+    let found = check_sealed(&partial, cycle).and_then(|()| disk::list(&partial));
+    // Its folder may be gone since it was made, a moment ago.
+    let found =
+        found.map_err(|error| if partial.exists() { error } else { tables_deleted(parent) })?;
+    for path in found {
         if is_stale(&path, cycle) {
             fs::remove_file(&path).map_err(|e| RecordError::new(path.display(), e))?;
         }
