@@ -15,7 +15,8 @@ use sidestep_planners::{
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Robots that one planner leads: those of one section, or of several that follow each other. All have one size and act in the same cycles.
+/// Robots that one planner leads: those of one section, or of several that follow each other. All have one size and act in
+/// the same cycles.
 #[derive(Debug, Clone)]
 pub(crate) struct Team {
     /// Their ids.

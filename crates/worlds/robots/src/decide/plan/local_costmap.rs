@@ -18,8 +18,8 @@ const SEARCH_SIDE_BOXES: i32 = FREE_WINDOW_COLUMNS as i32;
 /// The walls among the boxes in which something is looked for.
 type FreeWindow = sidestep_map::planning::FreeWindow<FREE_WINDOW_COLUMNS>;
 
-/// Most boxes in one of which a report of a class other than the nearest may be for it to block them. A class of many boxes with one
-/// thing somewhere in them would wall a corridor off; its boxes are vague instead.
+/// Most boxes that a report of a thing in one of them blocks, if its class is not the nearest. Many boxes with one thing
+/// somewhere in them would wall a corridor off; they are vague instead.
 const MAX_EXACT_BOXES: usize = 2;
 /// Votes of a beam for each box that it has passed, and against each of a few boxes in one of which it reports something.
 /// Over more boxes they are spread, so that a report of one in many does not outweigh a beam that has passed.
