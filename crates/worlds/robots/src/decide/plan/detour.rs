@@ -214,8 +214,10 @@ mod tests {
             let [blocked, vague] = sets.map(|bits| LocalBoxSet::from_rows(|row| (bits >> (9 * row)) as u32));
             let moved = moved.checked_sub(1);
             let prices = StepCosts { blocked: 31, beside: 6, vague: 5, off_lane: 8, is_on_detour: false, moved, is_sidestep };
-            let view =
-                LocalView { field: &field, at, heading, blocked, vague, may_err: true, is_done: false, is_alone: false };
+            let view = LocalView {
+                field: &field, at, heading, blocked, vague,
+                may_err: true, is_agile: false, is_done: false, is_alone: false,
+            };
             let step = first_step(&view, prices);
             let mut exits = [LocalBoxSet::default(); EXIT_LEVELS];
             let Some(grid) = LocalGrid::new(&view, prices, &mut exits) else {
@@ -242,6 +244,7 @@ mod tests {
             blocked,
             vague,
             may_err: false,
+            is_agile: true,
             is_done: false,
             is_alone: false,
         };

@@ -16,6 +16,8 @@ pub(super) struct LocalView<'a> {
     pub(super) is_done: bool,
     /// Whether sensors or wheels err.
     pub(super) may_err: bool,
+    /// Whether the robot has one box and nothing errs.
+    pub(super) is_agile: bool,
     /// Whether no other body is noticed.
     pub(super) is_alone: bool,
 }

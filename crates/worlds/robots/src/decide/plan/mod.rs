@@ -62,8 +62,15 @@ const MAX_SPARSE_BLOCKED: usize = 6;
 /// Decisions for which a robot waits before something in the hope that it goes on; then it goes around. Who leaves a queue
 /// meets those that come: with less patience crowded corridors turn into knots.
 const PATIENT_DECISIONS: u8 = 20;
+/// Actions in vain that cost an agile robot one of these decisions: it stands in a knot, which a queue does not take apart.
+const STUCK_ACTIONS_PER_DECISION: u8 = 4;
+/// Decisions for which an agile robot waits at least; that often the thing before it was about to go on.
+const MIN_PATIENT_DECISIONS: u8 = 2;
 /// Price of a blocked place for a robot that is patient: a step aside and back costs more, a free lane beside less.
 const PATIENT_BLOCKED_COST: u16 = 4;
+/// The same for an agile robot: it loses little by a step aside and back. Larger bodies turn queues into knots by them, and
+/// slips and wrong readings make them longer.
+const AGILE_PATIENT_BLOCKED_COST: u16 = 6;
 /// The same for a robot that has no patience left: above that of a long detour.
 const IMPATIENT_BLOCKED_COST: u16 = 31;
 /// Price of a place beside a blocked one.
@@ -92,6 +99,8 @@ pub struct Planner {
     beam_model: BeamModel,
     /// Whether sensors or wheels err, so that what a robot waits for may not be there.
     may_err: bool,
+    /// Whether robots have one box and nothing errs, so that they leave a queue and find back into it with ease.
+    is_agile: bool,
 }
 
 /// The present goal of a robot.
@@ -120,7 +129,8 @@ impl Planner {
         wheels_err: bool,
     ) -> Self {
         let beam_model = BeamModel::new(walls, size, body, box_size_m);
-        Self { may_err: wheels_err || !beam_model.are_reliable, beam_model }
+        let may_err = wheels_err || !beam_model.are_reliable;
+        Self { beam_model, may_err, is_agile: size == 1 && !may_err }
     }
 
     /// Returns the next action of a robot.
@@ -201,6 +211,7 @@ impl Planner {
             blocked,
             vague,
             may_err: self.may_err,
+            is_agile: self.is_agile,
             is_done: goal.is_done,
             is_alone,
         }
@@ -427,7 +438,7 @@ fn travel(
     let Some(direction) = direction else { return STAY };
     if !memory.is_on_detour()
         && view.field.lanes().is_some()
-        && memory.waited >= PATIENT_DECISIONS
+        && memory.waited >= patient_decisions(memory, view)
         && !view.descends(direction)
     {
         memory.waited = MAX_WAITED;
@@ -440,7 +451,7 @@ fn travel(
     if view.is_blocked(direction) {
         memory.waited += 1;
         // Sensors that err may see something in a narrow gap forever. When its patience is over, one decision in four tries
-        // to go on, so that of two robots that wait for each other mostly one moves.
+        // to go on, so that of two robots that wait for each other mostly one moves. Where nothing errs it is there.
         let has_waited = view.may_err && memory.waited > PATIENT_DECISIONS;
         let tries = has_waited && draws.uniform_below(4) == 0;
         return if tries { FORWARD } else { STAY };
@@ -457,16 +468,18 @@ fn travel(
 /// on whether it is in a crowd.
 fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
     let moved = memory.moved.checked_sub(1);
-    let is_patient = memory.waited < PATIENT_DECISIONS;
+    let is_patient = memory.waited < patient_decisions(memory, view);
     let off_lane = if is_patient { OFF_LANE_COST } else { 1 };
     let blocked = if view.field.lanes().is_none() {
         // At first cheaper than most detours, because the obstacle may go away; each decision in vain
         // makes a longer detour worth it.
         (3 + 4 * u16::from(memory.waited)).min(IMPATIENT_BLOCKED_COST)
-    } else if is_patient {
-        PATIENT_BLOCKED_COST
-    } else {
+    } else if !is_patient {
         IMPATIENT_BLOCKED_COST
+    } else if view.is_agile {
+        AGILE_PATIENT_BLOCKED_COST
+    } else {
+        PATIENT_BLOCKED_COST
     };
     let is_in_crowd = view.blocked.len() > MAX_FEW_BLOCKED;
     let beside = if view.may_err && !is_in_crowd { CAREFUL_BESIDE_COST } else { BESIDE_COST };
@@ -483,6 +496,15 @@ fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
         moved,
         is_sidestep,
     }
+}
+
+/// Returns the decisions for which a robot waits before something on its lane.
+fn patient_decisions(memory: &PlannerMemory, view: &LocalView<'_>) -> u8 {
+    if !view.is_agile {
+        return PATIENT_DECISIONS;
+    }
+    let lost = memory.stuck / STUCK_ACTIONS_PER_DECISION;
+    PATIENT_DECISIONS.saturating_sub(lost).max(MIN_PATIENT_DECISIONS)
 }
 
 /// Returns whether to let another robot pass that may step into the same place: one from the
