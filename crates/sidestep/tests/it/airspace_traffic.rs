@@ -165,6 +165,47 @@ fn an_order_that_would_take_the_fallback_away_waits() {
     assert_eq!(delayed("off"), 0);
 }
 
+/// One below another, 3 km beside it and 3 km higher, which leaves long before it gets there.
+#[test]
+fn a_climb_waits_for_nobody_far_above() {
+    let climbs = "orders = [{ at_s = 10.0, altitude_m = 3048.0 }]";
+    let leaves = "altitude_m = 3048.0\norders = [{ at_s = 200.0, leaves = true }]";
+    let all = plane([0.0, 0.0], 90.0, [0.0, 90_000.0], climbs)
+        + &plane([300.0, 0.0], 90.0, [300.0, 90_000.0], leaves);
+    let altitudes_m = |shield: &str| {
+        let mut run =
+            run(&scenario(&format!("vertical_m = 305.0\nshield = \"{shield}\""), &all), 1);
+        let mut all_m = Vec::new();
+        while run.metrics().left == 0 {
+            run.advance(1);
+            all_m.push(run.snapshot().0.airplanes[0].altitude_m);
+        }
+        assert_eq!(run.metrics().orders_delayed, 0, "{shield}");
+        all_m
+    };
+    assert_eq!(altitudes_m("on"), altitudes_m("off"));
+}
+
+/// One straight below another, until that leaves.
+#[test]
+fn a_climb_levels_off_below_one_in_the_way_and_goes_on_when_that_is_gone() {
+    let climbs = "orders = [{ at_s = 10.0, altitude_m = 1500.0, climb_m_s = 10.0 }]";
+    let leaves = "altitude_m = 1000.0\norders = [{ at_s = 200.0, leaves = true }]";
+    let all = plane([0.0, 0.0], 90.0, [0.0, 90_000.0], climbs)
+        + &plane([0.0, 0.0], 90.0, [0.0, 90_000.0], leaves);
+    let mut run = run(&scenario("method = \"none\"\nvertical_m = 300.0", &all), 1);
+    assert!(run.collector().counters.too_close.is_empty(), "they start on levels that do not meet");
+    let altitude_m = |run: &AirspaceRun| run.snapshot().0.airplanes[0].altitude_m;
+    // 300 m below the other, where their levels just do not meet.
+    run.advance(38);
+    let held_m = altitude_m(&run);
+    assert!((699.9..=700.0).contains(&held_m), "{held_m}");
+    assert!(run.metrics().orders_delayed > 10);
+    run.advance(40);
+    assert!((altitude_m(&run) - 1500.0).abs() < 1e-9);
+    assert_eq!(run.metrics().losses_of_separation, 0);
+}
+
 fn orders_in_words() -> impl Strategy<Value = String> {
     let order = (10.0f64..300.0, 0u8..6, 0.0f64..1.0).prop_map(|(at_s, kind, part)| {
         let what = match kind {

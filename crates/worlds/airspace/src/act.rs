@@ -1,7 +1,8 @@
 //! *Act*: the airplanes of a group decide together and fly for `dt`.
 //!
 //! ```text
-//! prepare          airplanes enter, orders are executed           entry.rs, orders.rs
+//! prepare          airplanes enter, orders are executed, and      entry.rs, orders.rs,
+//!                  changes of level are cleared                   levels.rs
 //! Percept          what each perceives                            join.rs
 //!   -> Control     the decision for each: by one process for all (direct.rs), their pilots (deploy/),
 //!                  or pilots outside of the run (fleet.rs)
@@ -15,6 +16,7 @@ mod direct;
 mod entry;
 mod errors;
 mod flight;
+mod levels;
 mod orders;
 mod protect;
 mod step;
@@ -66,12 +68,12 @@ fn fly(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
                 let known = known_aircraft(world, state, now, slot);
                 FlightPathSource::Profile(
                     straight_profile(world, known),
-                    state.segment(world, slot),
+                    state.cleared_segment(world, slot),
                 )
             }
             _ => FlightPathSource::Profile(
                 profiles.next().unwrap_or_default(),
-                state.segment(world, slot),
+                state.cleared_segment(world, slot),
             ),
         };
         AircraftCycleMotion::new(context, slot, maneuver)
@@ -80,7 +82,8 @@ fn fly(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
     step::fly_sub_steps(context, flights);
 }
 
-/// Prepares the decisions: airplanes enter, exemptions of pairs begin and end, and orders that are due are executed.
+/// Prepares the decisions: airplanes enter, exemptions of pairs begin and end, orders that are due are executed, and
+/// changes of level are cleared.
 /// Returns the airplanes of a group that the method flies; `group` are those in the air, by id.
 pub(super) fn prepare_decisions(
     context: &mut PhaseContext<'_>,
@@ -88,12 +91,14 @@ pub(super) fn prepare_decisions(
 ) -> CooperativeGroup {
     // Nearness is that at the time when the group was formed, because orders change levels.
     let flown = CooperativeGroup::from_group(context, group);
+    levels::keep_levels(context, group);
     if context.world.shield {
         entry::release_exempt(context, &flown.ids);
         entry::assign_fallbacks(context, &flown.ids);
         errors::report_beyond_bound(context, &flown.ids);
     }
     orders::execute_due_orders(context, group, &flown.ids);
+    levels::clear_levels(context, group, &flown.ids);
     flown
 }
 

@@ -143,7 +143,8 @@ metrics! {
         pub replayed: u64 => "airplanes replayed to the end",
         /// Orders carried out.
         pub orders: u64 => "orders carried out",
-        /// Times that an order waited for the next `dt`. It waits while no orbit is apart from those of others.
+        /// Times that an order waited for the next `dt`, or held a change of level. It waits while no orbit is apart from
+        /// those of others.
         pub orders_delayed: u64 => "orders delayed",
         /// Pairs for which the shield promises nothing, and since when.
         pub too_close: Vec<UnprotectedPair> => "pairs without a promise",
@@ -202,7 +203,7 @@ metrics! {
         pub left: bool,
         /// Number of orders carried out.
         pub orders: u16,
-        /// Number of times that an order had to wait for the next `dt`.
+        /// Number of times that an order had to wait for the next `dt`, or held a change of level.
         pub orders_delayed: u16,
     }
 }

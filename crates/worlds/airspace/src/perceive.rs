@@ -71,6 +71,9 @@ pub(super) fn ownship_state(context: &PhaseContext<'_>, slot: EntitySlot) -> Own
         seen: observed_pose(world, slot, now, pose),
         seen_orbit_pose: observed_pose(world, slot, now, orbit_pose),
         altitude_m: current.altitude_m.get(),
+        levels: state
+            .cleared_segment(world, slot)
+            .levels_within(current.altitude_m.get(), world.timing.dt_s),
         next: current.next.get(),
         orders: current.orders.get().into(),
         fallback: current.fallback.get(),

@@ -37,6 +37,9 @@ pub struct AirspaceState {
     orbit_poses: Box<[OrbitPose]>,
     /// The turn rate of each airplane in the step that it flew last, in radians per second.
     turn_rates_rad_s: Box<[AtomicCell<f64>]>,
+    /// The altitude in meters to which each airplane may change its level in this cycle. It is found anew in each cycle,
+    /// and so no part of a snapshot.
+    cleared_m: Box<[AtomicCell<f64>]>,
     /// The action that a caller has ordered for each airplane; empty unless callers decide.
     external_actions: Box<[Mutex<Option<ExternalAction>>]>,
     /// The cycle for which controls were submitted, or [`NEVER`].
@@ -73,7 +76,7 @@ pub struct AirplaneState {
     pub orbiting: AtomicCell<u32>,
     /// Number of orders carried out.
     pub orders: AtomicCell<u16>,
-    /// Number of times that an order had to wait for the next `dt`.
+    /// Number of times that an order had to wait for the next `dt`, or held a change of level.
     pub waits: AtomicCell<u16>,
     /// Side of the stored fallback.
     pub fallback: AtomicCell<OrbitSide>,
@@ -221,6 +224,11 @@ impl AirspaceState {
             resolving: restore_memories(with_resolutions, &snapshot.resolving),
             exempt: (0..n).map(|_| Mutex::default()).collect(),
             orbit_poses: (0..with_orbit_poses).map(|_| OrbitPose::default()).collect(),
+            cleared_m: snapshot
+                .airplanes
+                .iter()
+                .map(|record| AtomicCell::new(record.altitude_m))
+                .collect(),
             turn_rates_rad_s: snapshot
                 .airplanes
                 .iter()
@@ -388,5 +396,20 @@ impl AirspaceState {
         slot: EntitySlot,
     ) -> InterOrderSegment<'a> {
         world.segment(slot, self.airplanes[slot as usize].orders.get().into())
+    }
+
+    /// Returns the same, with the altitude to which it may change its level in this cycle.
+    pub(super) fn cleared_segment<'a>(
+        &self,
+        world: &'a AirspaceWorld,
+        slot: EntitySlot,
+    ) -> InterOrderSegment<'a> {
+        let altitude_m = self.cleared_m[slot as usize].get();
+        InterOrderSegment { altitude_m, ..self.segment(world, slot) }
+    }
+
+    /// Stores the altitude to which an airplane may change its level in this cycle.
+    pub(super) fn clear_to(&self, slot: EntitySlot, altitude_m: f64) {
+        self.cleared_m[slot as usize].set(altitude_m);
     }
 }

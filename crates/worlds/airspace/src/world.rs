@@ -381,12 +381,10 @@ impl AirspaceWorld {
         &self.actions[slot as usize]
     }
 
-    /// Returns the levels that an airplane is on and changes to.
+    /// Returns the levels that an airplane is on, or passes as far as the method looks ahead.
     pub(crate) fn levels(&self, known: KnownAircraft) -> FlightLevelRange {
-        FlightLevelRange::between(
-            known.altitude_m,
-            self.segment(known.slot, known.orders).altitude_m,
-        )
+        let look_ahead_s = self.reactive_settings().look_ahead_s;
+        self.segment(known.slot, known.orders).levels_within(known.altitude_m, look_ahead_s)
     }
 
     /// Returns where each action would lead an airplane, and the cost of that beside non-cooperative aircraft.

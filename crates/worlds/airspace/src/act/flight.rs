@@ -98,12 +98,6 @@ impl<'a> AircraftCycleMotion<'a> {
         }
     }
 
-    /// Returns its altitude in meters some seconds after `altitude_m`, on a decided path.
-    pub(super) fn altitude_after_m(&self, segment: &InterOrderSegment<'_>, seconds: f64) -> f64 {
-        let max_climb_m = segment.climb_m_s * seconds;
-        self.altitude_m + (segment.altitude_m - self.altitude_m).clamp(-max_climb_m, max_climb_m)
-    }
-
     /// Finds the legs that it flies in one step.
     pub(super) fn find_step_legs(&mut self, wind_m_s: Point, moment: SubStep, dtau_s: f64) {
         self.legs.clear();
@@ -149,9 +143,7 @@ impl<'a> AircraftCycleMotion<'a> {
     /// Returns all levels that it is on during one step.
     pub(super) fn levels(&self, dtau_s: f64) -> FlightLevelRange {
         match &self.path {
-            FlightPathSource::Profile(_, segment) => {
-                FlightLevelRange::between(self.altitude_m, self.altitude_after_m(segment, dtau_s))
-            }
+            FlightPathSource::Profile(_, segment) => segment.levels_within(self.altitude_m, dtau_s),
             // Within a step a track may leave the levels of its ends.
             FlightPathSource::Track(_) => FlightLevelRange::ALL,
         }

@@ -1,11 +1,11 @@
 //! Orders that are due, and the conditions on which they are executed.
 //!
-//! With the shield, a new speed or level is accepted only when the airplane then has a fallback apart from all stored
-//! ones, because otherwise the invariant would be lost; until then the order waits, and so do those after it. While it
-//! changes its level, an airplane occupies the old one, the new one and all between.
+//! With the shield, a new speed is accepted only when the airplane then has a fallback apart from all stored
+//! ones, because otherwise the invariant would be lost; until then the order waits, and so do those after it. A new level
+//! is accepted at once, and the way to it cleared in stages (`levels.rs`).
 
 use super::protect::shielded_aircraft;
-use crate::flight::{FlightLevelRange, FlightOrder, FlightTask};
+use crate::flight::{FlightOrder, FlightTask};
 use crate::scratch::PhaseContext;
 use crate::shield::{OrbitSide, ShieldedAircraft, safe_orbit_side};
 use sidestep_kernel::EntitySlot;
@@ -45,16 +45,13 @@ fn fallback_after_order(
 ) -> Option<OrbitSide> {
     let PhaseContext { world, state, now, .. } = context;
     let current = &state.airplanes[slot as usize];
-    let changes_safety = matches!(order.task, FlightTask::Speed(_) | FlightTask::Altitude { .. });
+    let changes_safety = matches!(order.task, FlightTask::Speed(_));
     if !world.shield || !changes_safety || world.is_non_cooperative(slot, *now) {
         return Some(current.fallback.get());
     }
     let segment = world.segment(slot, u32::from(current.orders.get()) + 1);
-    let changed = ShieldedAircraft {
-        v_m_s: segment.model.v_m_s,
-        levels: FlightLevelRange::between(current.altitude_m.get(), segment.altitude_m),
-        ..shielded_aircraft(context, slot)
-    };
+    let changed =
+        ShieldedAircraft { v_m_s: segment.model.v_m_s, ..shielded_aircraft(context, slot) };
     let others = flown
         .iter()
         .filter(|&&other| other != slot)

@@ -52,7 +52,7 @@ fn fly(
     let is_at_end = match &flight.path {
         FlightPathSource::Profile(profile, segment) => {
             let omega = profile.omegas_rad_s[k];
-            let altitude_m = flight.altitude_after_m(segment, dtau_s);
+            let altitude_m = segment.altitude_after_m(flight.altitude_m, dtau_s);
             flight.altitude_m = altitude_m;
             let before = flight.pose;
             flight.pose = air.after_wind_step(before.step(segment.model.v_m_s, omega, dtau_s));

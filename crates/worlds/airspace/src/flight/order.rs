@@ -1,9 +1,9 @@
 //! Orders that airplanes are given in flight.
 //!
 //! An order to keep a heading or to follow way-points changes only which maneuvers an airplane prefers, so it is
-//! carried out at once. A new speed changes the orbit that it has stored as its fallback, and a new
-//! level the set of airplanes that it has to avoid: with the shield, such an order has to wait until
-//! it is safe.
+//! carried out at once. A new speed changes the orbit that it has stored as its fallback: with the shield, such an order has
+//! to wait until it is safe. A new level changes the set of airplanes that it has to avoid: with the shield, the way
+//! there is cleared in stages.
 
 use super::motion::Point;
 

@@ -1,6 +1,7 @@
 //! Segments of a flight: the flight between two orders.
 
 use super::airplane::AirplaneStart;
+use super::levels::FlightLevelRange;
 use super::motion::{AircraftModel, Point};
 use super::order::FlightTask;
 use super::surface::FAR_AHEAD_M;
@@ -17,6 +18,19 @@ pub(crate) struct InterOrderSegment<'a> {
     pub(crate) altitude_m: f64,
     /// Rate of that change, in meters per second.
     pub(crate) climb_m_s: f64,
+}
+
+impl InterOrderSegment<'_> {
+    /// Returns the altitude in meters that it has some seconds after `altitude_m`, if nothing holds it.
+    pub(crate) fn altitude_after_m(&self, altitude_m: f64, seconds: f64) -> f64 {
+        let max_climb_m = self.climb_m_s * seconds;
+        altitude_m + (self.altitude_m - altitude_m).clamp(-max_climb_m, max_climb_m)
+    }
+
+    /// Returns the levels that it is on in some seconds after `altitude_m`, if nothing holds it.
+    pub(crate) fn levels_within(&self, altitude_m: f64, seconds: f64) -> FlightLevelRange {
+        FlightLevelRange::between(altitude_m, self.altitude_after_m(altitude_m, seconds))
+    }
 }
 
 /// The part of a flight from an order on, in which this order and all before it hold.

@@ -48,6 +48,8 @@ pub struct OwnshipState {
     pub seen_orbit_pose: Pose2,
     /// Altitude in meters.
     pub altitude_m: f64,
+    /// The levels that it keeps or passes in the next `dt`, as far as its change of level is cleared.
+    pub levels: FlightLevelRange,
     /// Number of way-points done with.
     pub next: u32,
     /// Number of orders executed.
@@ -82,7 +84,7 @@ impl OwnshipState {
             orbit_rad_s: world.orbit_rad_s[self.id as usize],
             separation_m: segment.model.separation_m,
             error_m: world.error_m(self.id as usize),
-            levels: FlightLevelRange::between(self.altitude_m, segment.altitude_m),
+            levels: self.levels,
             vertical_m: world.vertical_m,
             fallback: self.fallback,
             exempt: self.exempt.as_slice().into(),

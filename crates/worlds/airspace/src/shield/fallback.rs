@@ -1,7 +1,8 @@
-//! Fallbacks of airplanes that enter, or that are about to change speed or level.
+//! Fallbacks of airplanes that enter, or that are about to change speed or level, and how far they may change that.
 
 use super::orbit::OrbitSide;
 use super::shielded_aircraft::{MARGIN_M, ShieldedAircraft};
+use crate::flight::FlightLevelRange;
 use sidestep_kernel::interrupt;
 
 /// Returns sides for first fallbacks that are pairwise apart, as far as there are any, and the
@@ -69,6 +70,66 @@ pub(crate) fn safe_orbit_side(
     [changed.fallback].into_iter().chain(other_sides).find(|&side| {
         others.iter().all(|other| changed.do_orbits_stay_apart(side, other, other.fallback))
     })
+}
+
+/// Returns the altitude in meters, at most `to_m`, to which an airplane may change its level, and the side on which it then
+/// has an orbit apart from the stored fallbacks of all others whose levels it meets. Of two sides it takes the one that
+/// lets it go farther, preferably the stored one.
+///
+/// The shield keeps it apart from those whose levels it is on already, so it can always stay where it is.
+pub(crate) fn next_level(
+    changing: &ShieldedAircraft,
+    to_m: f64,
+    others: &[ShieldedAircraft],
+) -> (f64, OrbitSide) {
+    // Between two `dt` it is on one level.
+    let from_m = changing.levels.low_m;
+    let passing =
+        ShieldedAircraft { levels: FlightLevelRange::between(from_m, to_m), ..changing.clone() };
+    let met: Vec<&ShieldedAircraft> =
+        others.iter().filter(|other| passing.is_protected_from(other)).collect();
+    let level_m = |side: OrbitSide| {
+        let mut free_m = to_m;
+        for &other in &met {
+            let is_met_now = changing.is_protected_from(other);
+            // By the invariant; with errors of position the two need not be seen apart anew.
+            let is_kept_apart = is_met_now && side == changing.fallback;
+            if is_kept_apart || passing.do_orbits_stay_apart(side, other, other.fallback) {
+                continue;
+            }
+            if is_met_now {
+                return None;
+            }
+            let vertical_m = passing.vertical_m.max(other.vertical_m);
+            free_m = level_short_of(other.levels, vertical_m, from_m, free_m);
+        }
+        Some(free_m)
+    };
+    let stored = (level_m(changing.fallback).unwrap_or(from_m), changing.fallback);
+    if stored.0 == to_m {
+        return stored;
+    }
+    let other_sides = OrbitSide::BOTH.into_iter().filter(|&side| side != changing.fallback);
+    let found = other_sides.filter_map(|side| Some((level_m(side)?, side)));
+    let farther = found.filter(|(level_m, _)| (level_m - from_m).abs() > (stored.0 - from_m).abs());
+    farther.last().unwrap_or(stored)
+}
+
+/// Returns the altitude in meters, between `from_m` and `to_m`, up to which a change of level stays off the levels of
+/// another airplane: `vertical_m` from them.
+pub(crate) fn level_short_of(
+    levels: FlightLevelRange,
+    vertical_m: f64,
+    from_m: f64,
+    to_m: f64,
+) -> f64 {
+    // By a margin, so that rounding never makes them meet.
+    let gap_m = vertical_m + MARGIN_M;
+    if to_m >= from_m {
+        (levels.low_m - gap_m).clamp(from_m, to_m)
+    } else {
+        (levels.high_m + gap_m).clamp(to_m, from_m)
+    }
 }
 
 /// Returns for each airplane all others whose orbits might come too near its own, by rising number.

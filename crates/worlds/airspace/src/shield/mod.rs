@@ -28,9 +28,9 @@
 //!    invariant.
 //! 5. *Changes.* Between two `dt` a pair comes under the invariant in three ways, and never without
 //!    orbits that are apart: one of the two enters, and chooses an orbit apart from the other's,
-//!    or else the pair is exempt (`entry_fallbacks`); one is ordered to a level or a speed, which is executed only
-//!    with an orbit apart from those of all that it then has to avoid, regardless of other exempt pairs
-//!    (`safe_side`); or the exemption of the pair ends, which it does once their orbits are apart (`act/entry.rs`). An
+//!    or else the pair is exempt (`entry_fallbacks`); one is ordered to a speed, or changes its level in the next
+//!    `dt`, which it does only as far as it has an orbit apart from those of all that it then has to avoid, regardless of
+//!    other exempt pairs (`safe_orbit_side`, `next_level`); or the exemption of the pair ends, which it does once their orbits are apart (`act/entry.rs`). An
 //!    airplane that leaves the world keeps every other pair as it was.
 //!
 //! By induction over `dt` no pair that is not exempt ever loses separation. In a plane, a wind that all know
@@ -63,7 +63,9 @@ mod tests;
 pub(crate) use curvature::curvature_error_m;
 pub use errors::ErrorBounds;
 pub(crate) use errors::{OrbitTracker, common_orbit_rates};
-pub(crate) use fallback::{entry_fallbacks, first_fallbacks, safe_orbit_side};
+pub(crate) use fallback::{
+    entry_fallbacks, first_fallbacks, level_short_of, next_level, safe_orbit_side,
+};
 pub use orbit::OrbitSide;
 pub(crate) use orbit::stays_apart_for;
 pub(crate) use safe_maneuver::SafeManeuver;

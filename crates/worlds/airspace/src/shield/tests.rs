@@ -77,6 +77,37 @@ fn nearest_on_orbits(group: &[ShieldedAircraft], seconds: usize) -> f64 {
 }
 
 proptest! {
+    /// Where a change of level is cleared, the invariant holds with all on the levels that it passes; where it is not, the
+    /// airplane stays clear of those in the way.
+    #[test]
+    fn a_change_of_level_is_cleared_as_far_as_fallbacks_are_apart(
+        group in some_flyers(), levels_m in prop::collection::vec(0.0f64..2000.0, 9), to_m in 0.0f64..2000.0,
+    ) {
+        let mut group = group;
+        for (one, level_m) in group.iter_mut().zip(levels_m) {
+            one.levels = FlightLevelRange::from_level(level_m);
+        }
+        let group = with_fallbacks(group);
+        let changing = &group[0];
+        let from_m = changing.levels.low_m;
+        let (level_m, side) = next_level(changing, to_m, &group);
+        prop_assert!((from_m.min(to_m)..=from_m.max(to_m)).contains(&level_m), "{from_m} {level_m} {to_m}");
+        let cleared = |to_m: f64| ShieldedAircraft { levels: FlightLevelRange::between(from_m, to_m), ..changing.clone() };
+        let is_safe = |to_m: f64, side: OrbitSide| {
+            let passing = cleared(to_m);
+            group.iter().filter(|other| passing.is_protected_from(other))
+                .all(|other| passing.do_orbits_stay_apart(side, other, other.fallback))
+        };
+        prop_assert!(is_safe(level_m, side));
+        if level_m != to_m {
+            // A meter on somebody is in the way, on either side.
+            let on_m = level_m + (to_m - level_m).clamp(-1.0, 1.0);
+            prop_assert!(OrbitSide::BOTH.iter().all(|&side| !is_safe(on_m, side) || (on_m - level_m).abs() < 0.02));
+        }
+    }
+}
+
+proptest! {
     /// Step 1 of the proof: first fallbacks without clashes stay apart forever.
     #[test]
     fn first_fallbacks_stay_apart(group in some_flyers()) {

@@ -1,0 +1,85 @@
+//! Changes of level, cleared in stages.
+//!
+//! An airplane that changes its level claims in each `dt` only the levels that it passes in it. Its fallback in the vertical
+//! is to level off, which it can at any time: between two `dt` it occupies no level but its own. With the shield,
+//! it passes only levels on which it has an orbit apart from the stored ones of all that it then has to avoid, so that
+//! the invariant holds for them, too. Where there is none it levels off just short of them, and goes on once there is. So
+//! those far above delay nobody on the ground.
+
+use super::protect::shielded_aircraft;
+use crate::avoid::NonCooperativeAvoidance;
+use crate::flight::FlightLevelRange;
+use crate::non_cooperative::NonCooperativeAircraft;
+use crate::perceive::{non_cooperative_aircraft, ownship_state};
+use crate::scratch::PhaseContext;
+use crate::shield::{ShieldedAircraft, level_short_of, next_level};
+use sidestep_kernel::EntitySlot;
+
+/// Lets the airplanes of a group keep their levels, until they are cleared for others.
+pub(super) fn keep_levels(context: &PhaseContext<'_>, group: &[EntitySlot]) {
+    for &slot in group {
+        context.state.clear_to(slot, context.state.airplanes[slot as usize].altitude_m.get());
+    }
+}
+
+/// Clears the changes of level of a group for the next `dt`: with the shield, as far as is safe. `flown` are the group's
+/// airplanes that the method flies, by id.
+pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flown: &[EntitySlot]) {
+    let PhaseContext { world, state, now, .. } = *context;
+    let target_m = |slot: EntitySlot| state.segment(world, slot).altitude_m;
+    let is_changing =
+        |slot: EntitySlot| state.airplanes[slot as usize].altitude_m.get() != target_m(slot);
+    for &slot in group.iter().filter(|&&slot| is_changing(slot)) {
+        if !world.shield || world.is_non_cooperative(slot, now) {
+            state.clear_to(slot, target_m(slot));
+        }
+    }
+    if !world.shield || !flown.iter().any(|&slot| is_changing(slot)) {
+        return;
+    }
+    let non_cooperative = non_cooperative_aircraft(context, group);
+    let mut all: Vec<ShieldedAircraft> =
+        flown.iter().map(|&slot| shielded_aircraft(context, slot)).collect();
+    for (k, &slot) in flown.iter().enumerate().filter(|&(_, &slot)| is_changing(slot)) {
+        let current = &state.airplanes[slot as usize];
+        let segment = state.segment(world, slot);
+        let reach_m = segment.altitude_after_m(current.altitude_m.get(), world.timing.dt_s);
+        let free_m = level_beside_non_cooperative(context, slot, reach_m, &non_cooperative);
+        let (level_m, side) = next_level(&all[k], free_m, &all);
+        if level_m == reach_m {
+            // Where it is not held, its altitudes do not depend on the lengths of the stages.
+            state.clear_to(slot, segment.altitude_m);
+        } else {
+            state.clear_to(slot, level_m);
+            current.waits.set(current.waits.get().saturating_add(1));
+        }
+        current.fallback.set(side);
+        all[k].fallback = side;
+        all[k].levels = FlightLevelRange::between(current.altitude_m.get(), level_m);
+    }
+}
+
+/// Returns the altitude in meters that an airplane may pass on the way to `reach_m` beside non-cooperative ones: on its
+/// fallback it has to keep clear of those on the levels that it comes to.
+fn level_beside_non_cooperative(
+    context: &PhaseContext<'_>,
+    slot: EntitySlot,
+    reach_m: f64,
+    non_cooperative: &[NonCooperativeAircraft],
+) -> f64 {
+    if non_cooperative.is_empty() {
+        return reach_m;
+    }
+    let world = context.world;
+    let own = ownship_state(context, slot);
+    let levels = FlightLevelRange::between(own.altitude_m, reach_m);
+    let passing = ShieldedAircraft { levels, ..own.shielded_aircraft(world) };
+    let avoidance = NonCooperativeAvoidance::new(&passing, non_cooperative, world.timing.dtau_s);
+    let orbit = own.orbit_profile(world);
+    // It can do nothing here about those whose levels it is on already.
+    let ahead =
+        avoidance.threats(&orbit).filter(|one| !one.levels.overlaps(&own.levels, world.vertical_m));
+    ahead.fold(reach_m, |free_m, one| {
+        level_short_of(one.levels, world.vertical_m, own.altitude_m, free_m)
+    })
+}
