@@ -111,8 +111,9 @@ pub(crate) fn next_level(
     }
     let other_sides = OrbitSide::BOTH.into_iter().filter(|&side| side != changing.fallback);
     let found = other_sides.filter_map(|side| Some((level_m(side)?, side)));
-    let farther = found.filter(|(level_m, _)| (level_m - from_m).abs() > (stored.0 - from_m).abs());
-    farther.last().unwrap_or(stored)
+    let mut farther =
+        found.filter(|(level_m, _)| (level_m - from_m).abs() > (stored.0 - from_m).abs());
+    farther.next().unwrap_or(stored)
 }
 
 /// Returns the altitude in meters, between `from_m` and `to_m`, up to which a change of level stays off the levels of
