@@ -30,6 +30,9 @@ pub(super) fn decide(
         own.iter().zip(&all).map(|(own, (_, one))| unshielded_maneuver(own, one)).collect()
     };
     for ((control, _), maneuver) in all.iter_mut().zip(maneuvers) {
+        if world.has_resolution_memory() {
+            control.memory.record_maneuver(&maneuver);
+        }
         control.maneuver = maneuver;
     }
     all

@@ -5,6 +5,10 @@
 //! and fly apart. Each airplane then changes its present velocity so that the closest point moves out
 //! of the other's zone. It keeps to this, also after the conflict is no longer predicted, until the
 //! two are past their closest point and apart; then it flies to its way-point again.
+//!
+//! Its authors fly it alone. Beside the shield an airplane may fly something else than it wished, and a conflict of that
+//! velocity, or a heading to keep from it, would lead it ever farther astray. So after an override it forgets what it resolves,
+//! and looks for conflicts as if it flew to its way-point, until that way is free.
 
 use super::{AircraftState, vector_length};
 use crate::flight::Point;
@@ -29,9 +33,17 @@ pub struct ActiveResolutions {
     with: Vec<EntitySlot>,
     /// The heading that resolves them, in radians.
     heading_rad: f64,
+    /// Whether the shield has overridden its wish, and the way to its way-point was not free since.
+    is_overridden: bool,
 }
 
 impl ActiveResolutions {
+    /// Forgets the conflicts, because the airplane does not fly what would resolve them.
+    pub(crate) fn record_override(&mut self) {
+        self.with.clear();
+        self.is_overridden = true;
+    }
+
     /// The others, by rising slot.
     pub(crate) fn conflicting_aircraft(&self) -> &[EntitySlot] {
         &self.with
@@ -60,8 +72,10 @@ pub(crate) fn resolution_headings(
     settings: ReactiveSettings,
     meets: impl Fn(usize, usize) -> Option<AircraftState>,
 ) -> Vec<Option<f64>> {
+    let intended: Vec<AircraftState> =
+        all.iter().zip(&*resolving).map(|(own, memory)| intended_state(own, memory)).collect();
     let mut conflicts = Vec::with_capacity(all.len());
-    for (i, own) in all.iter().enumerate() {
+    for (i, own) in intended.iter().enumerate() {
         let mut own_conflicts = Vec::new();
         for j in (0..all.len()).filter(|&j| all[j].slot != own.slot) {
             if let Some(other) = meets(i, j)
@@ -75,7 +89,7 @@ pub(crate) fn resolution_headings(
     let by_slot = sorted_by_slot(all);
     // As in BlueSky, the headings are kept only while no airplane is in conflict.
     let has_conflict = conflicts.iter().any(|own_conflicts| !own_conflicts.is_empty());
-    let each = all.iter().zip(&conflicts).enumerate();
+    let each = intended.iter().zip(&conflicts).enumerate();
     for ((i, (own, own_conflicts)), memory) in each.zip(&mut *resolving) {
         if has_conflict {
             memory.heading_rad = resolution_heading_rad(own, own_conflicts, settings);
@@ -88,8 +102,20 @@ pub(crate) fn resolution_headings(
                 .and_then(|j| meets(i, j))
                 .is_some_and(|other| is_conflict_active(own, &other, settings))
         });
+        memory.is_overridden &= !memory.with.is_empty();
     }
     resolving.iter().map(|memory| (!memory.with.is_empty()).then_some(memory.heading_rad)).collect()
+}
+
+/// Returns an airplane as it means to fly: with its velocity, or after an override with that toward its way-point.
+fn intended_state(own: &AircraftState, memory: &ActiveResolutions) -> AircraftState {
+    if !memory.is_overridden {
+        return *own;
+    }
+    let v_m_s = vector_length(own.velocity);
+    let heading_rad = own.preferred_rad;
+    let velocity = [v_m_s * math::cos(heading_rad), v_m_s * math::sin(heading_rad)];
+    AircraftState { heading_rad, velocity, ..*own }
 }
 
 /// Returns the places of all airplanes by rising slot, because each looks for many of the others among them.
@@ -270,6 +296,28 @@ mod tests {
             test_aircraft(1, [1500.0, -400.0], std::f64::consts::PI),
         ];
         assert_eq!(looked(&past, &mut memory), [None, None]);
+    }
+
+    #[test]
+    fn who_was_overridden_resolves_conflicts_on_its_way_and_not_where_it_was_turned() {
+        let goes_east = AircraftState {
+            preferred_rad: 0.0,
+            ..test_aircraft(0, [0.0, 0.0], std::f64::consts::FRAC_PI_2)
+        };
+        let from_north = [goes_east, test_aircraft(1, [0.0, 4000.0], -std::f64::consts::FRAC_PI_2)];
+        let from_east = [goes_east, test_aircraft(1, [4000.0, 0.0], std::f64::consts::PI)];
+        let after = |is_overridden: bool, all: &[AircraftState]| {
+            let mut memory = [ActiveResolutions::default(), ActiveResolutions::default()];
+            if is_overridden {
+                memory[0].record_override();
+            }
+            let found = looked(all, &mut memory)[0];
+            (found.is_some(), memory[0].is_overridden)
+        };
+        assert_eq!(after(false, &from_north), (true, false));
+        assert_eq!(after(true, &from_north), (false, false), "its way is free");
+        assert_eq!(after(false, &from_east), (false, false));
+        assert_eq!(after(true, &from_east), (true, true), "until its way is free");
     }
 
     #[test]

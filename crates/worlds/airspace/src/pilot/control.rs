@@ -69,7 +69,20 @@ pub struct PilotMemory {
     pub resolving: ActiveResolutions,
 }
 
+impl PilotMemory {
+    /// Lets the method know of a maneuver that is not the one that it prefers.
+    pub(crate) fn record_maneuver(&mut self, maneuver: &Maneuver) {
+        if !maneuver.is_preferred() {
+            self.resolving.record_override();
+        }
+    }
+}
+
 impl Maneuver {
+    fn is_preferred(&self) -> bool {
+        matches!(self, Self::Profile { candidate: 0, .. })
+    }
+
     /// Returns the maneuver that follows from the shield's decision about those of the candidates that were `allowed`.
     pub(crate) fn from_decision(
         decision: ShieldDecision,

@@ -190,6 +190,9 @@ impl Pilot {
         let is_over = matches!(state.phase, PilotCyclePhase::Over);
         let now = state.percept.cycle;
         state.record_traffic(0);
+        if self.world.has_resolution_memory() {
+            self.memory.record_maneuver(&Maneuver::Orbit);
+        }
         let mut control =
             AirplaneControl { maneuver: Maneuver::Orbit, memory: self.memory, ..state.control };
         if !is_over {

@@ -84,6 +84,9 @@ impl Pilot {
     fn finish_cycle(&mut self) {
         if let Some(state) = &mut self.state {
             state.phase = PilotCyclePhase::Over;
+            if self.world.has_resolution_memory() {
+                self.memory.record_maneuver(&state.control.maneuver);
+            }
             state.control.memory = self.memory.clone();
         }
     }
