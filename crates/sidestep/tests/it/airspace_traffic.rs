@@ -165,7 +165,7 @@ fn an_order_that_would_take_the_fallback_away_waits() {
     assert_eq!(delayed("off"), 0);
 }
 
-/// One below another, 3 km beside it and 3 km higher, which leaves long before it gets there.
+/// One below another, 300 m beside it and 3 km higher, which leaves long before it gets there.
 #[test]
 fn a_climb_waits_for_nobody_far_above() {
     let climbs = "orders = [{ at_s = 10.0, altitude_m = 3048.0 }]";

@@ -30,8 +30,9 @@ fn shipped_scenarios_in_which_robots_arrive_have_no_gridlock() {
 fn sixty_robots_alone_go_on_arriving_in_corridors_two_boxes_wide() {
     let maze = include_str!("../../../../scenarios/papers/mapf/maze.toml")
         .replace("count = 20", "count = 60");
+    assert!(maze.contains("count = 60") && maze.contains("cycles = 800\n"), "{maze}");
     let trips = |seed: u64| {
-        let text = maze.replace("cycles = 800", &format!("cycles = 800\nseed = {seed}"));
+        let text = maze.replace("cycles = 800\n", &format!("cycles = 800\nseed = {seed}\n"));
         let mut run = robots_run(&Source::new("maze", &text, ""), 1).expect("a shipped scenario");
         run.advance(800);
         run.metrics().total.trips

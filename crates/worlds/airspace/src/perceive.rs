@@ -130,7 +130,9 @@ fn non_cooperative_at(context: &PhaseContext<'_>, slot: EntitySlot) -> NonCooper
             ([vx - wx, vy - wy], top_m_s, levels)
         }
         _ => {
-            let levels = FlightLevelRange::between(altitude_m, segment.altitude_m);
+            // Farther than within `dt`, because methods consider it as far as they look ahead.
+            let look_ahead_s = world.reactive_settings().look_ahead_s.max(dt_s);
+            let levels = segment.levels_within(altitude_m, look_ahead_s);
             (along(segment.model.v_m_s), world.top_m_s[slot as usize], levels)
         }
     };

@@ -1,7 +1,7 @@
 //! Changes of level, cleared in stages.
 //!
-//! An airplane that changes its level claims in each `dt` only the levels that it passes in it. Its fallback in the vertical
-//! is to level off, which it can at any time: between two `dt` it occupies no level but its own. With the shield,
+//! An airplane that changes its level occupies in each `dt` only the levels that it passes in it. Its fallback in the vertical
+//! is to level off, which it can at any time: between two `dt` it occupies no other level than its own. With the shield,
 //! it passes only levels on which it has an orbit apart from the stored ones of all that it then has to avoid, so that
 //! the invariant holds for them, too. Where there is none it levels off just short of them, and goes on once there is. So
 //! those far above delay nobody on the ground.
@@ -11,8 +11,9 @@ use crate::avoid::NonCooperativeAvoidance;
 use crate::flight::FlightLevelRange;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::perceive::{non_cooperative_aircraft, ownship_state};
+use crate::pilot::OwnshipState;
 use crate::scratch::PhaseContext;
-use crate::shield::{ShieldedAircraft, level_short_of, next_level};
+use crate::shield::{OrbitSide, ShieldedAircraft, altitude_short_of, next_altitude};
 use sidestep_kernel::EntitySlot;
 
 /// Lets the airplanes of a group keep their levels, until they are cleared for others.
@@ -26,44 +27,52 @@ pub(super) fn keep_levels(context: &PhaseContext<'_>, group: &[EntitySlot]) {
 /// airplanes that the method flies, by id.
 pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flown: &[EntitySlot]) {
     let PhaseContext { world, state, now, .. } = *context;
-    let target_m = |slot: EntitySlot| state.segment(world, slot).altitude_m;
-    let is_changing =
-        |slot: EntitySlot| state.airplanes[slot as usize].altitude_m.get() != target_m(slot);
+    let is_changing = |slot: EntitySlot| {
+        let segment = state.segment(world, slot);
+        segment.climb_m_s > 0.0
+            && state.airplanes[slot as usize].altitude_m.get() != segment.altitude_m
+    };
     for &slot in group.iter().filter(|&&slot| is_changing(slot)) {
         if !world.shield || world.is_non_cooperative(slot, now) {
-            state.clear_to(slot, target_m(slot));
+            state.clear_to(slot, state.segment(world, slot).altitude_m);
         }
     }
-    if !world.shield || !flown.iter().any(|&slot| is_changing(slot)) {
+    let mut changing: Vec<usize> = (0..flown.len()).filter(|&k| is_changing(flown[k])).collect();
+    if !world.shield || changing.is_empty() {
         return;
     }
     let non_cooperative = non_cooperative_aircraft(context, group);
     let mut all: Vec<ShieldedAircraft> =
         flown.iter().map(|&slot| shielded_aircraft(context, slot)).collect();
-    for (k, &slot) in flown.iter().enumerate().filter(|&(_, &slot)| is_changing(slot)) {
+    // One after the other, each with regard to the levels that those before it pass: by falling rank, as everywhere.
+    changing.sort_unstable_by_key(|&k| std::cmp::Reverse(all[k].rank));
+    for k in changing {
+        let slot = flown[k];
         let current = &state.airplanes[slot as usize];
         let segment = state.segment(world, slot);
         let reach_m = segment.altitude_after_m(current.altitude_m.get(), world.timing.dt_s);
-        let free_m = level_beside_non_cooperative(context, slot, reach_m, &non_cooperative);
-        let (level_m, side) = next_level(&all[k], free_m, &all);
-        if level_m == reach_m {
+        let beside_m =
+            |side| altitude_beside_non_cooperative(context, slot, side, reach_m, &non_cooperative);
+        let (altitude_m, side) = next_altitude(&all[k], reach_m, &all, beside_m);
+        if altitude_m == reach_m {
             // Where it is not held, its altitudes do not depend on the lengths of the stages.
             state.clear_to(slot, segment.altitude_m);
         } else {
-            state.clear_to(slot, level_m);
+            state.clear_to(slot, altitude_m);
             current.waits.set(current.waits.get().saturating_add(1));
         }
         current.fallback.set(side);
         all[k].fallback = side;
-        all[k].levels = FlightLevelRange::between(current.altitude_m.get(), level_m);
+        all[k].levels = FlightLevelRange::between(current.altitude_m.get(), altitude_m);
     }
 }
 
-/// Returns the altitude in meters that an airplane may pass on the way to `reach_m` beside non-cooperative ones: on its
-/// fallback it has to keep clear of those on the levels that it comes to.
-fn level_beside_non_cooperative(
+/// Returns the altitude in meters to which an airplane may go on the way to `reach_m` beside non-cooperative ones: on its
+/// orbit to a side it has to keep clear of those on the levels that it comes to.
+fn altitude_beside_non_cooperative(
     context: &PhaseContext<'_>,
     slot: EntitySlot,
+    side: OrbitSide,
     reach_m: f64,
     non_cooperative: &[NonCooperativeAircraft],
 ) -> f64 {
@@ -71,7 +80,7 @@ fn level_beside_non_cooperative(
         return reach_m;
     }
     let world = context.world;
-    let own = ownship_state(context, slot);
+    let own = OwnshipState { fallback: side, ..ownship_state(context, slot) };
     let levels = FlightLevelRange::between(own.altitude_m, reach_m);
     let passing = ShieldedAircraft { levels, ..own.shielded_aircraft(world) };
     let avoidance = NonCooperativeAvoidance::new(&passing, non_cooperative, world.timing.dtau_s);
@@ -80,6 +89,6 @@ fn level_beside_non_cooperative(
     let ahead =
         avoidance.threats(&orbit).filter(|one| !one.levels.overlaps(&own.levels, world.vertical_m));
     ahead.fold(reach_m, |free_m, one| {
-        level_short_of(one.levels, world.vertical_m, own.altitude_m, free_m)
+        altitude_short_of(one.levels, world.vertical_m, own.altitude_m, free_m)
     })
 }

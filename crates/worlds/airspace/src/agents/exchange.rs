@@ -86,7 +86,7 @@ pub struct Plan {
 pub struct Proposal {
     /// Airspeed in meters per second, if it is not as filed.
     v_m_s: Option<f64>,
-    /// The levels that it is on and changes to, if they are not as seen and filed.
+    /// The levels that it keeps or passes in the next `dt`, if they are not as seen and filed.
     levels: Option<FlightLevelRange>,
     /// Its pose on the stored orbit, if that is not where all see it.
     orbit_pose: Option<Pose2>,

@@ -28,7 +28,7 @@ pub struct StateBeacon {
     pub orbit_rad_s: f64,
     /// The separation that it asks for, in meters.
     pub separation_m: f64,
-    /// The levels that it is on and changes to.
+    /// The levels that it keeps or passes: in a proposal those of the next `dt`, else as far as methods have to mind them.
     pub levels: FlightLevelRange,
 }
 

@@ -24,7 +24,7 @@ pub struct AircraftState {
     /// Distance in meters within which no other airplane should come; of those that avoid nobody, enlarged by how far
     /// they may fly within `dt`.
     pub separation_m: f64,
-    /// The levels that it is on or passes.
+    /// The levels that it is on, or passes as far as the method looks ahead.
     pub levels: FlightLevelRange,
     /// Whether it gives way to others, too.
     pub yields: bool,

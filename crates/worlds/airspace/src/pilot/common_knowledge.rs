@@ -81,7 +81,12 @@ pub(super) fn beacon(world: &AirspaceWorld, known: KnownAircraft) -> StateBeacon
         omega_max_rad_s: segment.model.omega_max_rad_s,
         orbit_rad_s: world.orbit_rad_s[known.slot as usize],
         separation_m: segment.model.separation_m,
-        levels: world.levels(known),
+        // One that is not heard for long is known by its last beacon, and may have gone all the way by then.
+        levels: if world.network.is_some() {
+            FlightLevelRange::between(known.altitude_m, segment.altitude_m)
+        } else {
+            world.levels(known)
+        },
     }
 }
 

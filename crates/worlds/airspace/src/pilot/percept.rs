@@ -134,7 +134,7 @@ impl Percept {
     /// When it is not.
     pub fn check(&self, world: &AirspaceWorld) -> Result<(), InvalidMessage> {
         let n = world.airplanes.len();
-        let OwnshipState { id, orders, ref exempt, .. } = self.own;
+        let OwnshipState { id, orders, ref exempt, altitude_m, levels, .. } = self.own;
         let others = self.non_cooperative.iter().map(|one| one.slot).chain(exempt.iter().copied());
         let are_known = self.members().into_iter().chain(others).all(|id| (id as usize) < n);
         let is_ascending = self.group.windows(2).all(|pair| pair[0].id < pair[1].id);
@@ -142,6 +142,9 @@ impl Percept {
         InvalidMessage::Airplane.ensure(are_known && is_ascending && is_member)?;
         InvalidMessage::Plan
             .ensure(orders as usize <= world.airplanes[id as usize].orders.len())?;
+        let has_levels = levels.low_m <= altitude_m && altitude_m <= levels.high_m;
+        InvalidMessage::Number
+            .ensure(has_levels && levels.high_m - levels.low_m < f64::INFINITY)?;
         // From where the group is seen all its members compute together. The airplane's other numbers enter only what
         // it sends, and the others check that.
         let seen =

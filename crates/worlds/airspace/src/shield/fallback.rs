@@ -5,6 +5,10 @@ use super::shielded_aircraft::{MARGIN_M, ShieldedAircraft};
 use crate::flight::FlightLevelRange;
 use sidestep_kernel::interrupt;
 
+/// Meters by which an airplane may climb or descend farther than was computed, by what is rounded: half of what the difference of
+/// altitude that keeps levels apart is less than the scenario's, so that levels that are apart nominally do not meet.
+const CLIMB_ROUNDING_M: f64 = 5e-7;
+
 /// Returns sides for first fallbacks that are pairwise apart, as far as there are any, and the
 /// pairs that are not: they start too close.
 pub(crate) fn first_fallbacks(group: &[ShieldedAircraft]) -> (Vec<OrbitSide>, Vec<(usize, usize)>) {
@@ -72,24 +76,30 @@ pub(crate) fn safe_orbit_side(
     })
 }
 
-/// Returns the altitude in meters, at most `to_m`, to which an airplane may change its level, and the side on which it then
-/// has an orbit apart from the stored fallbacks of all others whose levels it meets. Of two sides it takes the one that
-/// lets it go farther, preferably the stored one.
+/// Returns the altitude in meters, between its own and `to_m`, to which an airplane may change its level, and the side on which
+/// it then has an orbit apart from the stored fallbacks of all others whose levels it meets. Of two sides it takes the one
+/// that lets it go farther, preferably the stored one. `limit_m` is how far it may go on a side whatever these others do.
 ///
 /// The shield keeps it apart from those whose levels it is on already, so it can always stay where it is.
-pub(crate) fn next_level(
+pub(crate) fn next_altitude(
     changing: &ShieldedAircraft,
     to_m: f64,
     others: &[ShieldedAircraft],
+    limit_m: impl Fn(OrbitSide) -> f64,
 ) -> (f64, OrbitSide) {
     // Between two `dt` it is on one level.
     let from_m = changing.levels.low_m;
-    let passing =
-        ShieldedAircraft { levels: FlightLevelRange::between(from_m, to_m), ..changing.clone() };
+    // In steps of `dtau` it may come out beyond `to_m` by what is rounded.
+    let beyond_m = to_m + CLIMB_ROUNDING_M * (to_m - from_m).signum();
+    let passing = ShieldedAircraft {
+        levels: FlightLevelRange::between(from_m, beyond_m),
+        ..changing.clone()
+    };
     let met: Vec<&ShieldedAircraft> =
         others.iter().filter(|other| passing.is_protected_from(other)).collect();
-    let level_m = |side: OrbitSide| {
-        let mut free_m = to_m;
+    // `None` where it would lose the fallback that keeps it apart from those on its own level.
+    let altitude_m = |side: OrbitSide| {
+        let mut free_m = limit_m(side);
         for &other in &met {
             let is_met_now = changing.is_protected_from(other);
             // By the invariant; with errors of position the two need not be seen apart anew.
@@ -101,24 +111,26 @@ pub(crate) fn next_level(
                 return None;
             }
             let vertical_m = passing.vertical_m.max(other.vertical_m);
-            free_m = level_short_of(other.levels, vertical_m, from_m, free_m);
+            free_m = altitude_short_of(other.levels, vertical_m, from_m, free_m);
         }
         Some(free_m)
     };
-    let stored = (level_m(changing.fallback).unwrap_or(from_m), changing.fallback);
-    if stored.0 == to_m {
-        return stored;
+    let stored_m = altitude_m(changing.fallback).unwrap_or(from_m);
+    if stored_m == to_m {
+        return (stored_m, changing.fallback);
     }
-    let other_sides = OrbitSide::BOTH.into_iter().filter(|&side| side != changing.fallback);
-    let found = other_sides.filter_map(|side| Some((level_m(side)?, side)));
-    let mut farther =
-        found.filter(|(level_m, _)| (level_m - from_m).abs() > (stored.0 - from_m).abs());
-    farther.next().unwrap_or(stored)
+    let other_side = changing.fallback.opposite();
+    match altitude_m(other_side) {
+        Some(other_m) if (other_m - from_m).abs() > (stored_m - from_m).abs() + MARGIN_M => {
+            (other_m, other_side)
+        }
+        _ => (stored_m, changing.fallback),
+    }
 }
 
 /// Returns the altitude in meters, between `from_m` and `to_m`, up to which a change of level stays off the levels of
 /// another airplane: `vertical_m` from them.
-pub(crate) fn level_short_of(
+pub(crate) fn altitude_short_of(
     levels: FlightLevelRange,
     vertical_m: f64,
     from_m: f64,

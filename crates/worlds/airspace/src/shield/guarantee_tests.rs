@@ -254,10 +254,15 @@ fn every_deployment_minds_intruders_alike() {
 /// Some recorded and silent airplanes that cross the traffic, with kinks and climbs.
 fn non_cooperative() -> impl Strategy<Value = String> {
     let coordinate = || -7000.0f64..7000.0;
-    let one = ([coordinate(), coordinate(), coordinate(), coordinate()], 20.0f64..90.0, 0u8..3);
+    let one = ([coordinate(), coordinate(), coordinate(), coordinate()], 20.0f64..90.0, 0u8..4);
     let one = one.prop_map(|([x, y, to_x, to_y], v_m_s, kind)| match kind {
         0 => plane([x, y], 20.0, [to_x, to_y], &format!("v_m_s = {v_m_s:?}\nintruder = true")),
         1 => track([x, y], [to_x, to_y], 0.0, v_m_s, to_x / 9.0) + "intruder = true\n",
+        2 => {
+            let climbs = "orders = [{ at_s = 40.0, altitude_m = 900.0, climb_m_s = 6.0 }]";
+            let more = format!("v_m_s = {v_m_s:?}\nintruder = true\n{climbs}");
+            plane([x, y], 20.0, [to_x, to_y], &more)
+        }
         _ => track([x, y], [to_x, to_y], 350.0, v_m_s, 0.0),
     });
     prop::collection::vec(one, 1..4).prop_map(|all| all.concat())

@@ -28,10 +28,14 @@
 //!    invariant.
 //! 5. *Changes.* Between two `dt` a pair comes under the invariant in three ways, and never without
 //!    orbits that are apart: one of the two enters, and chooses an orbit apart from the other's,
-//!    or else the pair is exempt (`entry_fallbacks`); one is ordered to a speed, or changes its level in the next
-//!    `dt`, which it does only as far as it has an orbit apart from those of all that it then has to avoid, regardless of
-//!    other exempt pairs (`safe_orbit_side`, `next_level`); or the exemption of the pair ends, which it does once their orbits are apart (`act/entry.rs`). An
-//!    airplane that leaves the world keeps every other pair as it was.
+//!    or else the pair is exempt (`entry_fallbacks`); one is ordered to a speed, or passes levels in the next `dt`,
+//!    which it does only as far as it has an orbit apart from those of all that it then has to avoid, regardless of
+//!    other exempt pairs (`safe_orbit_side`, `next_altitude`); or the exemption of the pair ends, which it does
+//!    once their orbits are apart (`act/entry.rs`). An airplane that leaves the world keeps every other pair as it was.
+//! 6. *Levels.* An airplane can level off at any time, so between two `dt` it occupies its own level alone. Then those
+//!    that change it are cleared one after the other, each with regard to the levels that those before it pass: from
+//!    those that it meets anew its orbit has to be apart, and those that it has met already are apart by the
+//!    invariant, or because they were cleared with regard to it.
 //!
 //! By induction over `dt` no pair that is not exempt ever loses separation. In a plane, a wind that all know
 //! moves all alike and changes no distance. On the earth each pair is compared in a plane of its own, and
@@ -64,7 +68,7 @@ pub(crate) use curvature::curvature_error_m;
 pub use errors::ErrorBounds;
 pub(crate) use errors::{OrbitTracker, common_orbit_rates};
 pub(crate) use fallback::{
-    entry_fallbacks, first_fallbacks, level_short_of, next_level, safe_orbit_side,
+    altitude_short_of, entry_fallbacks, first_fallbacks, next_altitude, safe_orbit_side,
 };
 pub use orbit::OrbitSide;
 pub(crate) use orbit::stays_apart_for;

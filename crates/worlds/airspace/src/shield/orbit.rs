@@ -32,6 +32,14 @@ impl OrbitSide {
     /// Both sides, in the order in which plans are tried.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
+    /// Returns the other side.
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+
     /// Returns +1 for left, -1 for right.
     pub fn sign(self) -> f64 {
         match self {

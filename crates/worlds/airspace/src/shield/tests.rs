@@ -77,32 +77,46 @@ fn nearest_on_orbits(group: &[ShieldedAircraft], seconds: usize) -> f64 {
 }
 
 proptest! {
-    /// Where a change of level is cleared, the invariant holds with all on the levels that it passes; where it is not, the
-    /// airplane stays clear of those in the way.
+    /// All of a group are cleared in turn, some to the level of others: the invariant holds with all on the levels that they
+    /// pass, and who is held is held by somebody.
     #[test]
-    fn a_change_of_level_is_cleared_as_far_as_fallbacks_are_apart(
-        group in some_flyers(), levels_m in prop::collection::vec(0.0f64..2000.0, 9), to_m in 0.0f64..2000.0,
+    fn changes_of_level_are_cleared_as_far_as_fallbacks_are_apart(
+        group in some_flyers(), levels_m in prop::collection::vec((0.0f64..2000.0, 0.0f64..2000.0), 9),
+        exempt in any::<bool>(),
     ) {
         let mut group = group;
-        for (one, level_m) in group.iter_mut().zip(levels_m) {
-            one.levels = FlightLevelRange::from_level(level_m);
+        for (one, (level_m, _)) in group.iter_mut().zip(&levels_m) {
+            one.levels = FlightLevelRange::from_level(*level_m);
         }
-        let group = with_fallbacks(group);
-        let changing = &group[0];
-        let from_m = changing.levels.low_m;
-        let (level_m, side) = next_level(changing, to_m, &group);
-        prop_assert!((from_m.min(to_m)..=from_m.max(to_m)).contains(&level_m), "{from_m} {level_m} {to_m}");
-        let cleared = |to_m: f64| ShieldedAircraft { levels: FlightLevelRange::between(from_m, to_m), ..changing.clone() };
-        let is_safe = |to_m: f64, side: OrbitSide| {
-            let passing = cleared(to_m);
-            group.iter().filter(|other| passing.is_protected_from(other))
-                .all(|other| passing.do_orbits_stay_apart(side, other, other.fallback))
-        };
-        prop_assert!(is_safe(level_m, side));
-        if level_m != to_m {
-            // A meter on somebody is in the way, on either side.
-            let on_m = level_m + (to_m - level_m).clamp(-1.0, 1.0);
-            prop_assert!(OrbitSide::BOTH.iter().all(|&side| !is_safe(on_m, side) || (on_m - level_m).abs() < 0.02));
+        let mut group = with_fallbacks(group);
+        if exempt && group.len() > 1 {
+            let ids = [group[0].id, group[1].id];
+            group[0].exempt = [ids[1]].into();
+            group[1].exempt = [ids[0]].into();
+        }
+        for (k, (_, to_m)) in levels_m.iter().enumerate().take(group.len()) {
+            let changing = group[k].clone();
+            let from_m = changing.levels.low_m;
+            let (altitude_m, side) = next_altitude(&changing, *to_m, &group, |_| *to_m);
+            prop_assert!((from_m.min(*to_m)..=from_m.max(*to_m)).contains(&altitude_m), "{from_m} {altitude_m} {to_m}");
+            let is_safe = |altitude_m: f64, side: OrbitSide| {
+                let levels = FlightLevelRange::between(from_m, altitude_m);
+                let passing = ShieldedAircraft { levels, ..changing.clone() };
+                group.iter().filter(|other| passing.is_protected_from(other))
+                    .all(|other| passing.do_orbits_stay_apart(side, other, other.fallback))
+            };
+            let left_m = to_m - altitude_m;
+            if left_m.abs() > 0.05 {
+                let on_m = altitude_m + left_m.clamp(-0.05, 0.05);
+                prop_assert!(OrbitSide::BOTH.iter().all(|&side| !is_safe(on_m, side)), "{on_m} is free");
+            }
+            group[k].levels = FlightLevelRange::between(from_m, altitude_m);
+            group[k].fallback = side;
+        }
+        for (i, a) in group.iter().enumerate() {
+            for b in group[..i].iter().filter(|b| a.is_protected_from(b)) {
+                prop_assert!(a.do_orbits_stay_apart(a.fallback, b, b.fallback), "{a:?} {b:?}");
+            }
         }
     }
 }

@@ -24,7 +24,7 @@ pub struct ObservedAircraft {
     pub takes_part: bool,
     /// Its airspeed by its filed flight, in meters per second.
     pub filed_v_m_s: f64,
-    /// The levels that it is on and changes to, as it is seen and by its filed flight.
+    /// The levels from the one where it is seen to the one of its filed flight.
     pub filed_levels: FlightLevelRange,
     /// Its greatest speed in meters per second.
     pub max_speed_m_s: f64,

@@ -8,7 +8,8 @@
 //!    the last contact, for a few decisions.
 //! 3. *Detour*: the cheapest path through the places around it. On lanes a blocked place costs few actions while the robot
 //!    is patient, because the obstacle may go away, and many when it is not; a place off lane costs more while it is
-//!    patient, and little when it goes around something that stays. Without lanes, a blocked place costs more with each
+//!    patient, and little when it goes around something that stays. A robot of one box where nothing errs is *agile*: it
+//!    goes around sooner, and waits the less the longer it has made no progress. Without lanes, a blocked place costs more with each
 //!    decision in vain.
 //! 4. *Requests*: a robot that waits before something asks it to make room ([`PassRequest`]). A robot
 //!    obeys a rank above its own: it takes a free place that it was not asked for, or passes the
@@ -60,9 +61,10 @@ const MAX_YIELD_DECISIONS: u8 = 4;
 /// A thing blocks more places for a larger body, which has the less room beside it: so it is soon among too many.
 const MAX_SPARSE_BLOCKED: usize = 6;
 /// Decisions for which a robot waits before something in the hope that it goes on; then it goes around. Who leaves a queue
-/// meets those that come: with less patience crowded corridors turn into knots.
+/// meets those that come: with less patience crowded corridors turn into knots. An agile robot begins with as many.
 const PATIENT_DECISIONS: u8 = 20;
-/// Actions in vain that cost an agile robot one of these decisions: it stands in a knot, which a queue does not take apart.
+/// Points of being stuck that cost an agile robot one of these decisions. One that waits gains a point an action, and loses some by
+/// what it gains on its goal: so a slow queue costs patience, too, but a knot costs all of it.
 const STUCK_ACTIONS_PER_DECISION: u8 = 4;
 /// Decisions for which an agile robot waits at least; that often the thing before it was about to go on.
 const MIN_PATIENT_DECISIONS: u8 = 2;
@@ -438,7 +440,7 @@ fn travel(
     let Some(direction) = direction else { return STAY };
     if !memory.is_on_detour()
         && view.field.lanes().is_some()
-        && memory.waited >= patient_decisions(memory, view)
+        && memory.waited >= patient_decisions(memory, view.is_agile)
         && !view.descends(direction)
     {
         memory.waited = MAX_WAITED;
@@ -468,7 +470,7 @@ fn travel(
 /// on whether it is in a crowd.
 fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
     let moved = memory.moved.checked_sub(1);
-    let is_patient = memory.waited < patient_decisions(memory, view);
+    let is_patient = memory.waited < patient_decisions(memory, view.is_agile);
     let off_lane = if is_patient { OFF_LANE_COST } else { 1 };
     let blocked = if view.field.lanes().is_none() {
         // At first cheaper than most detours, because the obstacle may go away; each decision in vain
@@ -499,8 +501,8 @@ fn step_costs(memory: &PlannerMemory, view: &LocalView<'_>) -> StepCosts {
 }
 
 /// Returns the decisions for which a robot waits before something on its lane.
-fn patient_decisions(memory: &PlannerMemory, view: &LocalView<'_>) -> u8 {
-    if !view.is_agile {
+fn patient_decisions(memory: &PlannerMemory, is_agile: bool) -> u8 {
+    if !is_agile {
         return PATIENT_DECISIONS;
     }
     let lost = memory.stuck / STUCK_ACTIONS_PER_DECISION;
@@ -522,5 +524,22 @@ fn turn_to(heading: u8, direction: u8) -> Option<ActionId> {
         3 => Some(RIGHT),
         // To go back, two turns to the left do it.
         _ => Some(LEFT),
+    }
+}
+
+#[cfg(test)]
+mod patience_tests {
+    use super::*;
+
+    #[test]
+    fn who_makes_no_progress_for_long_has_less_patience_but_some() {
+        let patience = |stuck: u8, is_agile: bool| {
+            patient_decisions(&PlannerMemory { stuck, ..PlannerMemory::default() }, is_agile)
+        };
+        assert_eq!(
+            [0, 3, 4, 40, 72, 255].map(|stuck| patience(stuck, true)),
+            [20, 20, 19, 10, 2, 2]
+        );
+        assert_eq!([0, 40, 255].map(|stuck| patience(stuck, false)), [20; 3]);
     }
 }
