@@ -1,10 +1,10 @@
 //! Changes of level, cleared in stages.
 //!
-//! An airplane that changes its level occupies in each `dt` only the levels that it passes in it. Its fallback in the vertical
-//! is to level off, which it can at any time: between two `dt` it occupies no other level than its own. With the shield,
-//! it passes only levels on which it has an orbit apart from the stored ones of all that it then has to avoid, so that
-//! the invariant holds for them, too. Where there is none it levels off just short of them, and goes on once there is. So
-//! those far above delay nobody on the ground.
+//! An airplane that changes its level occupies in each `dt` only the levels that it passes in it. Its fallback in the
+//! vertical is to level off, which it can at any time: between two `dt` it occupies no other level than its own. With the
+//! shield, it passes only levels on which it has an orbit apart from the stored ones of all that it then has to avoid, so
+//! that the invariant holds for them, too. Where there is none it levels off just short of them, and goes on once there
+//! is. So those far above delay nobody on the ground.
 
 use super::protect::shielded_aircraft;
 use crate::avoid::NonCooperativeAvoidance;

@@ -5,8 +5,9 @@ use super::shielded_aircraft::{MARGIN_M, ShieldedAircraft};
 use crate::flight::FlightLevelRange;
 use sidestep_kernel::interrupt;
 
-/// Meters by which an airplane may climb or descend farther than was computed, by what is rounded: half of what the difference of
-/// altitude that keeps levels apart is less than the scenario's, so that levels that are apart nominally do not meet.
+/// Meters by which an airplane may climb or descend farther than was computed, by what is rounded. The difference of
+/// altitude that keeps levels apart is less than the scenario's by twice as much, so that levels that are apart
+/// nominally do not meet.
 const CLIMB_ROUNDING_M: f64 = 5e-7;
 
 /// Returns sides for first fallbacks that are pairwise apart, as far as there are any, and the
@@ -76,9 +77,10 @@ pub(crate) fn safe_orbit_side(
     })
 }
 
-/// Returns the altitude in meters, between its own and `to_m`, to which an airplane may change its level, and the side on which
-/// it then has an orbit apart from the stored fallbacks of all others whose levels it meets. Of two sides it takes the one
-/// that lets it go farther, preferably the stored one. `limit_m` is how far it may go on a side whatever these others do.
+/// Returns the altitude in meters, between its own and `to_m`, to which an airplane may change its level, and the side
+/// on which it then has an orbit apart from the stored fallbacks of all others whose levels it meets. Of two sides it
+/// takes the one that lets it go farther, preferably the stored one. `limit_m` is how far it may go on a side whatever
+/// these others do.
 ///
 /// The shield keeps it apart from those whose levels it is on already, so it can always stay where it is.
 pub(crate) fn next_altitude(

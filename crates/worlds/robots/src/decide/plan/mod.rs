@@ -65,7 +65,7 @@ const MAX_SPARSE_BLOCKED: usize = 6;
 const PATIENT_DECISIONS: u8 = 20;
 /// Points of being stuck that cost an agile robot one of these decisions. One that waits gains a point an action, and loses some by
 /// what it gains on its goal: so a slow queue costs patience, too, but a knot costs all of it.
-const STUCK_ACTIONS_PER_DECISION: u8 = 4;
+const STUCK_POINTS_PER_DECISION: u8 = 4;
 /// Decisions for which an agile robot waits at least; that often the thing before it was about to go on.
 const MIN_PATIENT_DECISIONS: u8 = 2;
 /// Price of a blocked place for a robot that is patient: a step aside and back costs more, a free lane beside less.
@@ -505,7 +505,7 @@ fn patient_decisions(memory: &PlannerMemory, is_agile: bool) -> u8 {
     if !is_agile {
         return PATIENT_DECISIONS;
     }
-    let lost = memory.stuck / STUCK_ACTIONS_PER_DECISION;
+    let lost = memory.stuck / STUCK_POINTS_PER_DECISION;
     PATIENT_DECISIONS.saturating_sub(lost).max(MIN_PATIENT_DECISIONS)
 }
 
