@@ -87,7 +87,7 @@ log_event_kinds! {
     Arrival = "arrival",
     /// The shield has overridden an action; the value is the number of the action that is taken instead.
     Override = "override",
-    /// The shield keeps a body on its stored orbit.
+    /// The shield keeps a body on its stored fallback.
     Orbit = "orbit",
     /// An agent does not answer another one's requests.
     Unheard = "unheard",

@@ -149,10 +149,11 @@ fn a_new_route_replaces_the_old_one() {
 /// With the shield an order waits as long as it would take the fallback away; without, it does not.
 #[test]
 fn an_order_that_would_take_the_fallback_away_waits() {
-    // One on each side ahead, so that no wider orbit is apart from both of theirs.
+    // A row ahead, too dense to turn in front of it or to pass through it.
     let beside = |y: f64| plane([1500.0, y], 0.0, [40_000.0, y], "omega_max_deg_s = 6.0");
     let told = "orders = [{ at_s = 10.0, speed_m_s = 140.0 }]";
-    let all = beside(1600.0) + &beside(-1600.0) + &plane([0.0, 0.0], 0.0, [40_000.0, 0.0], told);
+    let row: String = (-4..=4).map(|k| beside(800.0 * f64::from(k))).collect();
+    let all = row + &plane([0.0, 0.0], 0.0, [40_000.0, 0.0], told);
     let delayed = |shield: &str| {
         let mut run = run(&scenario(&format!("shield = \"{shield}\""), &all), 1);
         assert!(run.collector().counters.too_close.is_empty());

@@ -29,9 +29,8 @@ use super::perceive::{known_aircraft, non_cooperative_aircraft, ownship_state};
 use super::pilot::{AirplaneControl, OwnshipState};
 use super::scratch::PhaseContext;
 use super::settings::Deployment;
-use super::shield::TurnProfile;
 use super::trace::GroupDecisions;
-use controls::apply_controls;
+use controls::{FlownProfile, apply_controls};
 use flight::{AircraftCycleMotion, FlightPathSource};
 use sidestep_kernel::EntitySlot;
 
@@ -60,21 +59,23 @@ fn fly(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
     let PhaseContext { world, state, now, .. } = *context;
     let flown = prepare_decisions(context, group);
     let non_cooperative = non_cooperative_aircraft(context, group);
-    let mut profiles = decide_turn_profiles(context, &flown, &non_cooperative).into_iter();
+    let mut profiles = decide_flown_profiles(context, &flown, &non_cooperative).into_iter();
     let flights = group.iter().map(|&slot| {
         let maneuver = match &world.airplanes[slot as usize].track {
             Some(track) if world.is_replayed(slot, now) => FlightPathSource::Track(track),
             _ if world.is_non_cooperative(slot, now) => {
                 let known = known_aircraft(world, state, now, slot);
-                FlightPathSource::Profile(
-                    straight_profile(world, known),
-                    state.cleared_segment(world, slot),
-                )
+                FlightPathSource::Profile {
+                    profile: straight_profile(world, known),
+                    fallback: None,
+                    segment: state.cleared_segment(world, slot),
+                }
             }
-            _ => FlightPathSource::Profile(
-                profiles.next().unwrap_or_default(),
-                state.cleared_segment(world, slot),
-            ),
+            _ => {
+                let FlownProfile { profile, fallback } = profiles.next().unwrap_or_default();
+                let segment = state.cleared_segment(world, slot);
+                FlightPathSource::Profile { profile, fallback, segment }
+            }
         };
         AircraftCycleMotion::new(context, slot, maneuver)
     });
@@ -102,13 +103,13 @@ pub(super) fn prepare_decisions(
     flown
 }
 
-/// Returns the turn profiles of the airplanes that the method flies: as those aboard decide, or as given by pilots
-/// outside of the run.
-fn decide_turn_profiles(
+/// Returns what the airplanes that the method flies fly: as those aboard decide, or as given by pilots outside of the
+/// run.
+fn decide_flown_profiles(
     context: &mut PhaseContext<'_>,
     flown: &CooperativeGroup,
     non_cooperative: &[NonCooperativeAircraft],
-) -> Vec<TurnProfile> {
+) -> Vec<FlownProfile> {
     let PhaseContext { world, state, now, .. } = *context;
     let own: Vec<OwnshipState> =
         flown.ids.iter().map(|&slot| ownship_state(context, slot)).collect();
@@ -135,7 +136,7 @@ fn decide_turn_profiles(
     }
     let profiles = apply_controls(context, &own, non_cooperative, controls);
     if let Some(trace) = &mut context.scratch.trace {
-        trace.flown = trace.own_part(&profiles).cloned();
+        trace.flown = trace.own_part(&profiles).map(|flown| flown.profile.clone());
     }
     profiles
 }

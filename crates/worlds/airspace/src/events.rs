@@ -16,13 +16,13 @@ pub enum EventKind {
     /// The shield has changed an airplane's action; the value is the number of the candidate that it flies instead,
     /// counted from the preferred one.
     Override,
-    /// The shield keeps an airplane on its stored orbit.
+    /// The shield keeps an airplane on its stored fallback.
     Orbit,
     /// An airplane has not heard another one in spite of asking.
     Unheard,
     /// Time was up before an airplane's agent was done.
     Deadline,
-    /// An airplane stays on its orbit because not all others have accepted its plan.
+    /// An airplane stays on its fallback because not all others have accepted its plan.
     HeldBack,
     /// A group is too large for the memory allowed: its airplanes fly straight on, as far as the
     /// shield lets them; the value is the number of airplanes.
@@ -33,7 +33,7 @@ pub enum EventKind {
     /// An airplane can be reached in this `dt`, on any path, by a non-cooperative one; the value
     /// is their distance in meters.
     Intruder,
-    /// An airplane with an external pilot stays on its orbit, because no control of it came in time.
+    /// An airplane with an external pilot stays on its fallback, because no control of it came in time.
     Absent,
 }
 

@@ -19,7 +19,7 @@ pub trait RemotePilotRun {
     /// it.
     fn percepts(&self) -> Vec<Percept>;
 
-    /// Submits the controls of airplanes for the cycle to come. An airplane without one stays on its stored orbit;
+    /// Submits the controls of airplanes for the cycle to come. An airplane without one stays on its stored fallback;
     /// unless a network is given that may lose messages, so does its whole group, because then plans are safe only if
     /// all fly them. A run that is recorded keeps the controls, so that it can be computed again.
     ///

@@ -126,7 +126,7 @@ metrics! {
         /// Times that the shield changed a wish.
         pub shield_overrides: u64 => "wishes changed by the shield",
         /// Wishes changed by the shield for an orbit, for one `dt`.
-        pub shield_orbits: u64 => "falls back to an orbit",
+        pub shield_orbits: u64 => "falls back",
         /// Wishes changed because not all others had agreed in time.
         pub shield_held_back: u64 => "wishes held back for lack of agreement",
         /// Times that an airplane lost contact with another one.

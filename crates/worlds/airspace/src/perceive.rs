@@ -94,7 +94,7 @@ pub(super) fn surveillance_report(
         id: slot,
         pose: observed_pose(world, slot, now, current.pose()),
         altitude_m: current.altitude_m.get(),
-        orbit: (current.orbiting.get() > 0).then(|| current.fallback.get()),
+        orbit: (current.orbiting.get() > 0).then(|| current.fallback.get().orbit_side),
     }
 }
 

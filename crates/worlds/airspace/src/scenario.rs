@@ -16,7 +16,7 @@ use super::settings::{
     BuiltInMethod, Cooling, Decision, Deployment, Fading, Gibibytes, Grouping, HeadingNoise,
     Inflation, LevelGap, LookAhead, RecordSection, RoundCount, Step, Tolerance, Weight,
 };
-use super::shield::OrbitSide;
+use super::shield::Fallback;
 use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
@@ -155,7 +155,7 @@ pub struct CompiledAirspace {
     /// The tables that a run keeps, and the interval of its checkpoints.
     pub record: RecordSection,
     /// Sides of the first fallbacks, by id.
-    pub fallbacks: Arc<Vec<OrbitSide>>,
+    pub fallbacks: Arc<Vec<Fallback>>,
     /// Pairs with first fallbacks that are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,
     /// The text that it was compiled from.
@@ -234,7 +234,7 @@ impl CompiledAirspace {
 }
 
 /// Returns the state of an airplane at the start of its flight.
-fn initial_airplane_record(airplane: &AirplaneStart, fallback: OrbitSide) -> AirplaneSnapshot {
+fn initial_airplane_record(airplane: &AirplaneStart, fallback: Fallback) -> AirplaneSnapshot {
     AirplaneSnapshot {
         pose: airplane.start,
         ended: PackedFlightEnd::NONE,

@@ -10,7 +10,7 @@ use super::external_action::ExternalAction;
 use super::flight::{InterOrderSegment, Pose2, Surface};
 use super::method::MethodKind;
 use super::pilot::{AirplaneControl, PilotMemory};
-use super::shield::{ExemptIds, OrbitSide};
+use super::shield::{ExemptIds, Fallback};
 use super::world::AirspaceWorld;
 pub use end::{FlightEnd, PackedFlightEnd};
 use neighborhood::SpatialIndex;
@@ -33,7 +33,7 @@ pub struct AirspaceState {
     resolving: Box<[Mutex<ActiveResolutions>]>,
     /// The others with which each airplane is an exempt pair, see [`Self::exempt_pair`].
     exempt: Box<[Mutex<ExemptIds>]>,
-    /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
+    /// Each airplane's pose on its stored fallback; empty where no gust takes it off that.
     orbit_poses: Box<[OrbitPose]>,
     /// The turn rate of each airplane in the step that it flew last, in radians per second.
     turn_rates_rad_s: Box<[AtomicCell<f64>]>,
@@ -78,8 +78,8 @@ pub struct AirplaneState {
     pub orders: AtomicCell<u16>,
     /// Number of times that an order had to wait for the next `dt`, or held a change of level.
     pub waits: AtomicCell<u16>,
-    /// Side of the stored fallback.
-    pub fallback: AtomicCell<OrbitSide>,
+    /// The stored fallback.
+    pub fallback: AtomicCell<Fallback>,
 }
 
 /// A pose on an orbit, in cells, so that workers can store those of their groups at the same time.
@@ -252,7 +252,7 @@ impl AirspaceState {
         state
     }
 
-    /// Returns the pose that an airplane has on its stored orbit, if no gust has taken it off that.
+    /// Returns the pose that an airplane has on its stored fallback, if no gust has taken it off that.
     pub(super) fn orbit_pose(&self, slot: EntitySlot) -> Pose2 {
         match self.orbit_poses.get(slot as usize) {
             Some(orbit_pose) => Pose2 {
@@ -263,7 +263,7 @@ impl AirspaceState {
         }
     }
 
-    /// Stores the pose that an airplane has on its orbit.
+    /// Stores the pose that an airplane has on its fallback.
     pub(super) fn set_orbit_pose(&self, slot: EntitySlot, pose: Pose2) {
         if let Some(orbit_pose) = self.orbit_poses.get(slot as usize) {
             orbit_pose.x.set(pose.at[0]);

@@ -359,7 +359,7 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
         key_value_pair(
             "shield",
             format!(
-                "{} decisions changed, {} of them to orbits",
+                "{} decisions changed, {} of them to fallbacks",
                 group_thousands(m.shield_overrides),
                 group_thousands(m.shield_orbits)
             ),

@@ -8,7 +8,7 @@ use crate::events::Event;
 use crate::flight::{Action, KnownAircraft};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OwnshipState};
-use crate::shield::{OrbitSide, SafeManeuver, ShieldDecision, ShieldedAircraft, TurnProfile};
+use crate::shield::{Fallback, SafeManeuver, ShieldDecision, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, EntitySlot};
 
@@ -33,7 +33,7 @@ pub(crate) struct InspectionTrace {
     pub(crate) profiles: Vec<TurnProfile>,
     /// The shield's decision on that.
     pub(crate) decision: Option<ShieldDecision>,
-    /// Its stored orbit before.
+    /// The airplane as the shield knows it, with its stored fallback before.
     pub(crate) aircraft: Option<ShieldedAircraft>,
     /// The others that keep it from flying its first candidate.
     pub(crate) blockers: Vec<EntityId>,
@@ -132,7 +132,7 @@ impl ShieldOutcome<'_> {
             let candidate = (!self.candidates[k].profiles.is_empty()).then_some(0);
             self.plan(k, candidate, self.group[k].fallback, steps)
         };
-        let orbit = |k: usize| SafeManeuver::fallback(self.group[k].clone(), steps, self.dtau_s);
+        let orbit = |k: usize| SafeManeuver::on_fallback(self.group[k].clone(), steps, self.dtau_s);
         let plans: [&dyn Fn(usize) -> SafeManeuver; 3] = [&flown, &first, &orbit];
         for plan in plans {
             let others = (0..self.group.len()).filter(|&k| k != me);
@@ -147,21 +147,21 @@ impl ShieldOutcome<'_> {
         Vec::new()
     }
 
-    /// Returns the plan of an airplane with a candidate, or else on its stored orbit.
+    /// Returns the plan of an airplane with a candidate, or else on its stored fallback.
     fn plan(
         &self,
         k: usize,
         candidate: Option<usize>,
-        side: OrbitSide,
+        fallback: Fallback,
         steps: usize,
     ) -> SafeManeuver {
         let aircraft = self.group[k].clone();
         match candidate {
             Some(candidate) => {
                 let profile = &self.candidates[k].profiles[candidate];
-                SafeManeuver::new(aircraft, profile, self.dtau_s, side)
+                SafeManeuver::new(aircraft, profile, self.dtau_s, fallback)
             }
-            None => SafeManeuver::fallback(aircraft, steps, self.dtau_s),
+            None => SafeManeuver::on_fallback(aircraft, steps, self.dtau_s),
         }
     }
 }

@@ -181,10 +181,10 @@ pub(super) fn to_log_event(event: &Event) -> LogEvent {
             Severity::Info,
             format!("is kept by the shield from what it wanted, flies way {value}"),
         ),
-        EventKind::Orbit => (Severity::Warning, "is kept on its orbit by the shield".into()),
+        EventKind::Orbit => (Severity::Warning, "is kept on its fallback by the shield".into()),
         EventKind::Unheard => (Severity::Warning, format!("has not heard of airplane/{other}")),
         EventKind::Deadline => (Severity::Warning, "had no time left to decide".into()),
-        EventKind::HeldBack => (Severity::Warning, "stays on its orbit: not all agreed".into()),
+        EventKind::HeldBack => (Severity::Warning, "stays on its fallback: not all agreed".into()),
         EventKind::GroupTooLarge => {
             (Severity::Warning, format!("is in a group of {value}, too large to optimize"))
         }
@@ -196,7 +196,7 @@ pub(super) fn to_log_event(event: &Event) -> LogEvent {
             format!("can be reached by airplane/{other}, now {value:.0} m away"),
         ),
         EventKind::Absent => {
-            (Severity::Warning, "stays on its orbit: no control of it came in time".into())
+            (Severity::Warning, "stays on its fallback: no control of it came in time".into())
         }
     };
     let airplane = |id| BodyId::new(kinds::AIRPLANE, id, None);

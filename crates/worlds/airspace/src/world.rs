@@ -14,7 +14,7 @@ use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, Objective};
 use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings};
-use super::shield::{ErrorBounds, OrbitSide, common_orbit_rates, curvature_error_m};
+use super::shield::{ErrorBounds, Fallback, OrbitSide, common_orbit_rates, curvature_error_m};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::AgentTeams;
 use sidestep_kernel::network::Network;
@@ -91,8 +91,10 @@ pub struct AirspaceWorld {
     pub(crate) top_m_s: Arc<Vec<f64>>,
     /// Seconds that each airplane would need if it were alone.
     pub(crate) alone_s: Arc<Vec<f64>>,
-    /// Sides of the first fallbacks.
-    pub(crate) first_fallbacks: Arc<Vec<OrbitSide>>,
+    /// The fallbacks that the plans of each airplane may end with, in the order in which they are tried.
+    pub(crate) fallbacks: Arc<Vec<Arc<[Fallback]>>>,
+    /// The first fallbacks.
+    pub(crate) first_fallbacks: Arc<Vec<Fallback>>,
     /// The airplanes that decide, by the orders that they may be given.
     pub(crate) teams: Arc<AgentTeams>,
     /// The same world under the rules that hold from later cycles on, by rising cycle.
@@ -155,6 +157,8 @@ impl AirspaceWorld {
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
             self.top_m_s = Arc::new(self.map_airplanes(Self::max_speed_m_s));
         }
+        self.fallbacks =
+            Arc::new((0..self.airplanes.len()).map(|i| self.fallback_choices(i)).collect());
         self.curvature_m = self.curvature_error_m();
         self.alone_s = Arc::new(self.map_airplanes(Self::solo_s));
         self
@@ -182,13 +186,34 @@ impl AirspaceWorld {
         rates
     }
 
+    /// Returns the fallbacks that the plans of an airplane may end with.
+    fn fallback_choices(&self, i: usize) -> Arc<[Fallback]> {
+        // Where messages get lost, airplanes have to know the path of one that they cannot hear: they see on which
+        // side it orbits.
+        if self.network.is_some() {
+            return OrbitSide::BOTH.map(Fallback::from_side).into();
+        }
+        let radius_s = 1.0 / self.orbit_rad_s[i];
+        // As long as groups need not be larger for it than the method makes them, or a little longer.
+        let look_ahead_s = self.reactive_settings().look_ahead_s;
+        let max_lead_s = (look_ahead_s - self.timing.dt_s - 2.0 * radius_s).max(radius_s);
+        let model = &self.airplanes[i].model;
+        Fallback::choices(model, self.orbit_rad_s[i], self.timing.dt_s, max_lead_s)
+    }
+
+    /// Returns how far an airplane gets within one `dt`, and on a fallback after it, in meters.
+    fn fallback_reach_m(&self, i: usize) -> f64 {
+        let cycles = self.fallbacks[i].iter().map(|fallback| fallback.cycles_until_orbit()).max();
+        let lead_s = f64::from(cycles.unwrap_or(0)) * self.timing.dt_s;
+        let v_m_s = self.top_m_s[i];
+        v_m_s * (self.timing.dt_s + lead_s) + 2.0 * v_m_s / self.orbit_rad_s[i]
+    }
+
     /// Returns how far an airplane may be from where it is in the plane of a pair that has to be kept apart.
     pub(crate) fn curvature_error_m(&self) -> f64 {
         let is_orbiting = |i: &usize| self.shield && self.is_controlled(*i);
-        let reach_m = (0..self.airplanes.len()).filter(is_orbiting).map(|i| {
-            let v_m_s = self.top_m_s[i];
-            v_m_s * self.timing.dt_s + 2.0 * v_m_s / self.orbit_rad_s[i]
-        });
+        let reach_m =
+            (0..self.airplanes.len()).filter(is_orbiting).map(|i| self.fallback_reach_m(i));
         let max_reach_m = reach_m.fold(0.0, f64::max);
         let gaps_m = self.airplanes.iter().map(|airplane| airplane.model.separation_m);
         match self.surface {
@@ -321,14 +346,15 @@ impl AirspaceWorld {
         self.reach_m(a) + self.reach_m(b) + gap_m + 1.0
     }
 
-    /// Returns how far from where it is seen an airplane may get within the horizon, or on an orbit after the next
-    /// `dt`, in meters.
+    /// Returns how far from where it is seen an airplane may get within the horizon, or on a fallback after the
+    /// next `dt`, in meters.
     fn reach_m(&self, i: usize) -> f64 {
         let v_m_s = self.top_m_s[i];
-        let orbit_m = v_m_s * self.timing.dt_s + 2.0 * (v_m_s / self.orbit_rad_s[i]);
         let look_ahead_s = self.reactive_settings().look_ahead_s;
         // Positions are seen with an error, too.
-        (v_m_s * look_ahead_s).max(orbit_m) + self.error_m(i) + self.bounds.position_m
+        (v_m_s * look_ahead_s).max(self.fallback_reach_m(i))
+            + self.error_m(i)
+            + self.bounds.position_m
     }
 
     /// Returns how far the method looks ahead, and how much separation it asks for.

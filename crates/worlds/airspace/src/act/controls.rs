@@ -7,17 +7,25 @@ use crate::events::{Event, EventKind};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OptimizationStatus, OwnshipState};
 use crate::scratch::PhaseContext;
-use crate::shield::TurnProfile;
+use crate::shield::{Fallback, TurnProfile};
 use sidestep_kernel::EntityId;
 
+/// What an airplane flies for one `dt`.
+#[derive(Debug, Default)]
+pub(super) struct FlownProfile {
+    pub(super) profile: TurnProfile,
+    /// The fallback on which the profile keeps it, if it does.
+    pub(super) fallback: Option<Fallback>,
+}
+
 /// Stores the controls of the airplanes of a group that the method flies, and returns the turn profiles that they
-/// fly. One without a control stays on its stored orbit.
+/// fly. One without a control stays on its stored fallback.
 pub(super) fn apply_controls(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
     non_cooperative: &[NonCooperativeAircraft],
     mut controls: Vec<Option<AirplaneControl>>,
-) -> Vec<TurnProfile> {
+) -> Vec<FlownProfile> {
     let PhaseContext { world, state, .. } = *context;
     record_outcomes(context, own, &controls);
     if world.shield && world.network.is_none() && controls.iter().any(Option::is_none) {
@@ -37,14 +45,16 @@ pub(super) fn apply_controls(
             None => Maneuver::Orbit,
         };
         store_maneuver(context, own.id, &maneuver);
-        let profile = match maneuver {
-            Maneuver::Profile { profile, .. } => profile,
-            Maneuver::Orbit => own.orbit_profile(world),
+        let flown = match maneuver {
+            Maneuver::Profile { profile, .. } => FlownProfile { profile, fallback: None },
+            Maneuver::Orbit => {
+                FlownProfile { profile: own.fallback_profile(world), fallback: Some(own.fallback) }
+            }
         };
         if world.shield {
-            exempt_non_cooperative(context, own, non_cooperative, &profile);
+            exempt_non_cooperative(context, own, non_cooperative, &flown.profile);
         }
-        profiles.push(profile);
+        profiles.push(flown);
     }
     profiles
 }

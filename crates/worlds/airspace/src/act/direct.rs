@@ -10,7 +10,7 @@ use crate::flight::KnownAircraft;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OptimizationStatus, OwnshipState, PilotMemory};
 use crate::scratch::PhaseContext;
-use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile, filter_maneuvers};
+use crate::shield::{PlanCertainty, PlanRules, ShieldedAircraft, TurnProfile, filter_maneuvers};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{Cycle, EntitySlot};
 
@@ -104,7 +104,7 @@ fn decide_reactively(
 /// Returns the maneuver of an airplane that flies its first candidate.
 fn unshielded_maneuver(own: &OwnshipState, considered: &ManeuverCandidates) -> Maneuver {
     let profile = considered.profiles.first().cloned().unwrap_or_default();
-    Maneuver::Profile { candidate: 0, profile, side: own.fallback }
+    Maneuver::Profile { candidate: 0, profile, fallback: own.fallback }
 }
 
 /// Returns the maneuvers that the shield allows to the airplanes of a group.
@@ -120,13 +120,14 @@ fn shielded_maneuvers(
     let mut profiles: Vec<Vec<TurnProfile>> = Vec::with_capacity(own.len());
     for ((own, aircraft), (_, candidates)) in own.iter().zip(&group).zip(all) {
         let places = NonCooperativeAvoidance::new(aircraft, non_cooperative, dtau_s)
-            .allowed_profiles(&candidates.profiles, || own.orbit_profile(world));
+            .allowed_profiles(&candidates.profiles, || own.fallback_profile(world));
         profiles.push(places.iter().map(|&k| candidates.profiles[k].clone()).collect());
         allowed.push(places);
     }
     let steps = world.timing.points_per_dt();
     // In one process no message gets lost, so all fly the plans that they are given.
-    let decisions = filter_maneuvers(&group, &profiles, steps, dtau_s, PlanCertainty::Sure);
+    let rules = PlanRules { steps, dtau_s, certainty: PlanCertainty::Sure };
+    let decisions = filter_maneuvers(&group, &profiles, rules);
     let decided = decisions.into_iter().zip(&allowed).zip(all);
     decided
         .map(|((decision, allowed), (_, candidates))| {

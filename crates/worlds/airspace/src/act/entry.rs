@@ -3,7 +3,7 @@
 //!
 //! Such a pair becomes *exempt* when the later of the two enters and there are no orbits for it that are apart. That
 //! concerns the pair, not the two airplanes: each of them stays apart from all others. It ends for good as soon as
-//! their stored orbits are apart, their levels do not meet, or one of them is gone; from then on the invariant holds
+//! their stored fallbacks are apart, their levels do not meet, or one of them is gone; from then on the invariant holds
 //! for this pair as for any other.
 
 use super::protect::shielded_aircraft;
@@ -55,9 +55,9 @@ pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySl
     }
     let group: Vec<ShieldedAircraft> =
         flown.iter().map(|&slot| shielded_aircraft(context, slot)).collect();
-    let (sides, too_close) = entry_fallbacks(&group, |i| is_entering[i]);
-    for (&slot, side) in flown.iter().zip(sides) {
-        state.airplanes[slot as usize].fallback.set(side);
+    let (fallbacks, too_close) = entry_fallbacks(&group, |i| is_entering[i]);
+    for (&slot, fallback) in flown.iter().zip(fallbacks) {
+        state.airplanes[slot as usize].fallback.set(fallback);
     }
     for (i, j) in too_close {
         state.exempt_pair(flown[i], flown[j]);

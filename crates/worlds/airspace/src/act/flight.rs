@@ -4,7 +4,7 @@ use crate::flight::{
     ConstantRateLeg, FlightLevelRange, Frame, InterOrderSegment, Point, Pose2, RoutePosition, Track,
 };
 use crate::scratch::PhaseContext;
-use crate::shield::TurnProfile;
+use crate::shield::{Fallback, TurnProfile};
 use crate::state::FlightEnd;
 use sidestep_kernel::{Cycle, EntitySlot};
 use std::borrow::Cow;
@@ -47,8 +47,9 @@ pub(super) struct AircraftCycleMotion<'a> {
 
 /// The path of an airplane, decided for this `dt` or recorded.
 pub(super) enum FlightPathSource<'a> {
-    /// The turn rates that were decided, and the segment of the flight.
-    Profile(TurnProfile, InterOrderSegment<'a>),
+    /// The turn rates that were decided, the fallback on which they keep the airplane, if they do, and the
+    /// segment of the flight.
+    Profile { profile: TurnProfile, fallback: Option<Fallback>, segment: InterOrderSegment<'a> },
     /// A recorded track, flown as it is.
     Track(&'a Track),
 }
@@ -67,16 +68,17 @@ impl<'a> AircraftCycleMotion<'a> {
         let since_s = world.cycle_start_s(world.appearance_cycle(slot as usize)).max(recorded_s);
         let from = current.pose();
         let frame = match &path {
-            FlightPathSource::Profile(_, segment) if current.orbiting.get() > 0 => {
-                let omega = current.fallback.get().sign() * world.orbit_rad_s[slot as usize];
-                world.surface.orbit_frame(state.orbit_pose(slot), segment.model.v_m_s, omega)
+            FlightPathSource::Profile { fallback: Some(fallback), segment, .. } => {
+                let omega = fallback.omega_rad_s(world.orbit_rad_s[slot as usize]);
+                world.surface.fallback_frame(state.orbit_pose(slot), segment.model.v_m_s, omega)
             }
             _ => world.surface.frame_at(from.at),
         };
         let pose = frame.pose_to_local(from);
         let next = current.next.get() as usize;
         let mission = match &path {
-            FlightPathSource::Profile(_, InterOrderSegment { model, mission, .. }) => {
+            FlightPathSource::Profile { segment, .. } => {
+                let InterOrderSegment { model, mission, .. } = segment;
                 let route = RoutePosition { mission, next, pose };
                 world.flight_environment().local_mission(frame, model, route, world.timing.dt_s)
             }
@@ -102,7 +104,7 @@ impl<'a> AircraftCycleMotion<'a> {
     pub(super) fn find_step_legs(&mut self, wind_m_s: Point, moment: SubStep, dtau_s: f64) {
         self.legs.clear();
         match &self.path {
-            FlightPathSource::Profile(profile, segment) => {
+            FlightPathSource::Profile { profile, segment, .. } => {
                 let omega = profile.omegas_rad_s[moment.k];
                 let whole =
                     ConstantRateLeg::new(0.0, dtau_s, self.pose, segment.model.v_m_s, omega);
@@ -143,7 +145,9 @@ impl<'a> AircraftCycleMotion<'a> {
     /// Returns all levels that it is on during one step.
     pub(super) fn levels(&self, dtau_s: f64) -> FlightLevelRange {
         match &self.path {
-            FlightPathSource::Profile(_, segment) => segment.levels_within(self.altitude_m, dtau_s),
+            FlightPathSource::Profile { segment, .. } => {
+                segment.levels_within(self.altitude_m, dtau_s)
+            }
             // Within a step a track may leave the levels of its ends.
             FlightPathSource::Track(_) => FlightLevelRange::ALL,
         }

@@ -13,7 +13,7 @@ use crate::non_cooperative::NonCooperativeAircraft;
 use crate::perceive::{non_cooperative_aircraft, ownship_state};
 use crate::pilot::OwnshipState;
 use crate::scratch::PhaseContext;
-use crate::shield::{OrbitSide, ShieldedAircraft, altitude_short_of, next_altitude};
+use crate::shield::{Fallback, ShieldedAircraft, altitude_short_of, next_altitude};
 use sidestep_kernel::EntitySlot;
 
 /// Lets the airplanes of a group keep their levels, until they are cleared for others.
@@ -51,9 +51,10 @@ pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flo
         let current = &state.airplanes[slot as usize];
         let segment = state.segment(world, slot);
         let reach_m = segment.altitude_after_m(current.altitude_m.get(), world.timing.dt_s);
-        let beside_m =
-            |side| altitude_beside_non_cooperative(context, slot, side, reach_m, &non_cooperative);
-        let (altitude_m, side) = next_altitude(&all[k], reach_m, &all, beside_m);
+        let beside_m = |fallback| {
+            altitude_beside_non_cooperative(context, slot, fallback, reach_m, &non_cooperative)
+        };
+        let (altitude_m, fallback) = next_altitude(&all[k], reach_m, &all, beside_m);
         if altitude_m == reach_m {
             // Where it is not held, its altitudes do not depend on the lengths of the stages.
             state.clear_to(slot, segment.altitude_m);
@@ -61,8 +62,8 @@ pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flo
             state.clear_to(slot, altitude_m);
             current.waits.set(current.waits.get().saturating_add(1));
         }
-        current.fallback.set(side);
-        all[k].fallback = side;
+        current.fallback.set(fallback);
+        all[k].fallback = fallback;
         all[k].levels = FlightLevelRange::between(current.altitude_m.get(), altitude_m);
     }
 }
@@ -72,7 +73,7 @@ pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flo
 fn altitude_beside_non_cooperative(
     context: &PhaseContext<'_>,
     slot: EntitySlot,
-    side: OrbitSide,
+    fallback: Fallback,
     reach_m: f64,
     non_cooperative: &[NonCooperativeAircraft],
 ) -> f64 {
@@ -80,14 +81,15 @@ fn altitude_beside_non_cooperative(
         return reach_m;
     }
     let world = context.world;
-    let own = OwnshipState { fallback: side, ..ownship_state(context, slot) };
+    let own = OwnshipState { fallback, ..ownship_state(context, slot) };
     let levels = FlightLevelRange::between(own.altitude_m, reach_m);
     let passing = ShieldedAircraft { levels, ..own.shielded_aircraft(world) };
     let avoidance = NonCooperativeAvoidance::new(&passing, non_cooperative, world.timing.dtau_s);
-    let orbit = own.orbit_profile(world);
+    let falling_back = own.fallback_profile(world);
     // It can do nothing here about those whose levels it is on already.
-    let ahead =
-        avoidance.threats(&orbit).filter(|one| !one.levels.overlaps(&own.levels, world.vertical_m));
+    let ahead = avoidance
+        .threats(&falling_back)
+        .filter(|one| !one.levels.overlaps(&own.levels, world.vertical_m));
     ahead.fold(reach_m, |free_m, one| {
         altitude_short_of(one.levels, world.vertical_m, own.altitude_m, free_m)
     })

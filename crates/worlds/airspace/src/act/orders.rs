@@ -7,7 +7,7 @@
 use super::protect::shielded_aircraft;
 use crate::flight::{FlightOrder, FlightTask};
 use crate::scratch::PhaseContext;
-use crate::shield::{OrbitSide, ShieldedAircraft, safe_orbit_side};
+use crate::shield::{Fallback, ShieldedAircraft, safe_fallback};
 use sidestep_kernel::EntitySlot;
 
 /// Executes the orders of a group that are due and, with the shield, safe; the others wait. `flown` are the group's
@@ -24,14 +24,14 @@ pub(super) fn execute_due_orders(
         while let Some(order) =
             airplane.due_order(current.orders.get().into(), world.cycle_start_s(*now))
         {
-            let Some(side) = fallback_after_order(context, flown, slot, order) else {
+            let Some(fallback) = fallback_after_order(context, flown, slot, order) else {
                 current.waits.set(current.waits.get().saturating_add(1));
                 break;
             };
             let later = &world.later[slot as usize][usize::from(current.orders.get())];
             current.orders.set(current.orders.get() + 1);
             current.next.set(later.next.unwrap_or(current.next.get()));
-            current.fallback.set(side);
+            current.fallback.set(fallback);
         }
     }
 }
@@ -42,7 +42,7 @@ fn fallback_after_order(
     flown: &[EntitySlot],
     slot: EntitySlot,
     order: &FlightOrder,
-) -> Option<OrbitSide> {
+) -> Option<Fallback> {
     let PhaseContext { world, state, now, .. } = context;
     let current = &state.airplanes[slot as usize];
     let changes_safety = matches!(order.task, FlightTask::Speed(_));
@@ -56,5 +56,5 @@ fn fallback_after_order(
         .iter()
         .filter(|&&other| other != slot)
         .map(|&other| shielded_aircraft(context, other));
-    safe_orbit_side(&changed, others)
+    safe_fallback(&changed, others)
 }

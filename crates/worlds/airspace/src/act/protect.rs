@@ -59,8 +59,8 @@ pub(super) fn store_maneuver(
     let &mut PhaseContext { state, now, ref mut scratch, .. } = context;
     let current = &state.airplanes[slot as usize];
     match *maneuver {
-        Maneuver::Profile { candidate, side, .. } => {
-            current.fallback.set(side);
+        Maneuver::Profile { candidate, fallback, .. } => {
+            current.fallback.set(fallback);
             current.orbiting.set(0);
             if candidate > 0 {
                 current.overrides.set(current.overrides.get() + 1);
@@ -72,6 +72,7 @@ pub(super) fn store_maneuver(
             current.overrides.set(current.overrides.get() + 1);
             current.orbits.set(current.orbits.get() + 1);
             current.orbiting.set(current.orbiting.get() + 1);
+            current.fallback.set(current.fallback.get().after_cycle());
             scratch.events.push(Event::new(now, EventKind::Orbit, slot));
         }
     }
@@ -80,11 +81,11 @@ pub(super) fn store_maneuver(
 /// Moves the stored pose of an airplane along its orbit for one `dt`.
 fn advance_orbit_pose(context: &PhaseContext<'_>, slot: EntitySlot) {
     let PhaseContext { world, state, .. } = context;
-    let side = state.airplanes[slot as usize].fallback.get();
+    let fallback = state.airplanes[slot as usize].fallback.get();
     let v_m_s = state.segment(world, slot).model.v_m_s;
-    let omega = side.sign() * world.orbit_rad_s[slot as usize];
+    let omega = fallback.omega_rad_s(world.orbit_rad_s[slot as usize]);
     let stored = state.orbit_pose(slot);
-    let frame = world.surface.orbit_frame(stored, v_m_s, omega);
+    let frame = world.surface.fallback_frame(stored, v_m_s, omega);
     let mut orbit_pose = frame.pose_to_local(stored);
     for _ in 0..world.timing.points_per_dt() {
         orbit_pose = world.flight_environment().after_wind_step(orbit_pose.step(

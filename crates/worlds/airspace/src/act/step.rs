@@ -50,7 +50,7 @@ fn fly(
     let air = world.flight_environment();
     let dtau_s = world.timing.dtau_s;
     let is_at_end = match &flight.path {
-        FlightPathSource::Profile(profile, segment) => {
+        FlightPathSource::Profile { profile, segment, .. } => {
             let omega = profile.omegas_rad_s[k];
             let altitude_m = segment.altitude_after_m(flight.altitude_m, dtau_s);
             flight.altitude_m = altitude_m;
@@ -96,9 +96,9 @@ fn store_flight(context: &mut PhaseContext<'_>, flight: AircraftCycleMotion<'_>)
     let current = &state.airplanes[flight.slot as usize];
     let mut pose = flight.frame.pose_to_world(flight.pose);
     scratch.flown.extend(leg_rows(world, now, &flight));
-    let is_disturbed = matches!(flight.path, FlightPathSource::Profile(..));
+    let is_disturbed = matches!(flight.path, FlightPathSource::Profile { .. });
     let turn_rate_rad_s = match &flight.path {
-        FlightPathSource::Profile(profile, _) => {
+        FlightPathSource::Profile { profile, .. } => {
             profile.omegas_rad_s.last().copied().unwrap_or_default()
         }
         FlightPathSource::Track(_) => 0.0,

@@ -54,8 +54,8 @@ use super::traffic_state::{
 };
 use crate::flight::{FlightLevelRange, Pose2};
 use crate::shield::{
-    ExemptIds, OrbitSide, PlanCertainty, SafeManeuver, ShieldDecision, ShieldedAircraft,
-    TurnProfile, filter_maneuvers,
+    ExemptIds, Fallback, OrbitSide, PlanCertainty, PlanRules, SafeManeuver, ShieldDecision,
+    ShieldedAircraft, TurnProfile, filter_maneuvers,
 };
 use serde::{Deserialize, Serialize};
 pub use setup::{ObservedAircraft, ShieldExchangeSetup};
@@ -73,12 +73,12 @@ pub enum ShieldExchangeMessage {
     Accepts(Vec<EntityId>),
 }
 
-/// A profile that an airplane has proposed, and the side to which it turns after it.
+/// A profile that an airplane has proposed, and its fallback after that.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Plan {
     /// The place of the profile in its proposal.
     profile: u32,
-    side: OrbitSide,
+    fallback: Fallback,
 }
 
 /// What an airplane says of itself, and the profiles it would fly. What all see of it, or have on file, is left out.
@@ -88,9 +88,9 @@ pub struct Proposal {
     v_m_s: Option<f64>,
     /// The levels that it keeps or passes in the next `dt`, if they are not as seen and filed.
     levels: Option<FlightLevelRange>,
-    /// Its pose on the stored orbit, if that is not where all see it.
+    /// Its pose on the stored fallback, if that is not where all see it.
     orbit_pose: Option<Pose2>,
-    fallback: OrbitSide,
+    fallback: Fallback,
     exempt: Vec<EntityId>,
     rank: u64,
     #[serde(with = "turn_runs")]
@@ -228,7 +228,7 @@ impl ShieldExchangeAgent {
     }
 
     fn fallback(&self, aircraft: ShieldedAircraft) -> SafeManeuver {
-        SafeManeuver::fallback(aircraft, self.steps_per_dt(), self.dtau_s())
+        SafeManeuver::on_fallback(aircraft, self.steps_per_dt(), self.dtau_s())
     }
 
     fn aircraft_from_proposal(&self, place: usize, proposal: &Proposal) -> ShieldedAircraft {
@@ -248,6 +248,8 @@ impl ShieldExchangeAgent {
             levels: levels.unwrap_or(observed.filed_levels),
             vertical_m: self.setup.vertical_m,
             fallback: *fallback,
+            choices: Arc::clone(&seen.choices),
+            dt_s: seen.dt_s,
             exempt: exempt.as_slice().into(),
             rank: *rank,
         }
@@ -266,6 +268,7 @@ impl ShieldExchangeAgent {
         };
         sides
             .into_iter()
+            .map(Fallback::from_side)
             .map(|fallback| ShieldedAircraft { fallback, ..aircraft.clone() })
             .collect()
     }
@@ -331,9 +334,11 @@ impl ShieldExchangeAgent {
         filter_maneuvers(
             &group,
             &candidates,
-            self.steps_per_dt(),
-            self.dtau_s(),
-            self.setup.certainty,
+            PlanRules {
+                steps: self.steps_per_dt(),
+                dtau_s: self.dtau_s(),
+                certainty: self.setup.certainty,
+            },
         )[mine]
     }
 
@@ -356,8 +361,8 @@ impl ShieldExchangeAgent {
     fn send_plan(&mut self) -> ShieldExchangeMessage {
         let decision = self.compute_own_decision();
         self.decision = Some(decision);
-        let side = decision.fallback;
-        let plan = decision.candidate.map(|k| Plan { profile: k as u32, side });
+        let fallback = decision.fallback;
+        let plan = decision.candidate.map(|k| Plan { profile: k as u32, fallback });
         // Its fallback needs no consent, because all others keep apart from it anyway.
         self.asked =
             if plan.is_some() { self.consent_members(&self.own_plan(plan)) } else { Vec::new() };
@@ -376,9 +381,9 @@ impl ShieldExchangeAgent {
         proposal: &Proposal,
         plan: Option<Plan>,
     ) -> Option<SafeManeuver> {
-        let Some(Plan { profile, side }) = plan else { return Some(self.fallback(aircraft)) };
+        let Some(Plan { profile, fallback }) = plan else { return Some(self.fallback(aircraft)) };
         let profile = proposal.profiles.get(profile as usize)?;
-        Some(SafeManeuver::new(aircraft, profile, self.dtau_s(), side))
+        Some(SafeManeuver::new(aircraft, profile, self.dtau_s(), fallback))
     }
 
     /// Accepts the plans that keep apart from both its own plan and its own fallback.
@@ -463,7 +468,8 @@ impl ShieldExchangeAgent {
             let is_heard = member.proposal.is_some();
             // If it is seen to fly a profile, it has flown the plan that it has sent.
             let planned = member.plan.as_ref().and_then(Option::as_ref);
-            contact.planned = planned.map(|plan| PlanEnd { as_of: now + 1, side: plan.side });
+            contact.planned =
+                planned.map(|plan| PlanEnd { as_of: now + 1, side: plan.fallback.orbit_side });
             contact.presumed = Some(self.orbit_after_plan(&self.fallback(aircraft)));
             contact.unheard_in = (!is_heard).then_some(now);
         }
@@ -476,7 +482,7 @@ impl ShieldExchangeAgent {
         let mut pose = plan.end_pose();
         pose.at = [pose.at[0] + wx, pose.at[1] + wy];
         let pose = plan.frame().pose_to_world(pose);
-        OrbitState { pose, as_of: self.setup.now + 1, side: plan.side() }
+        OrbitState { pose, as_of: self.setup.now + 1, side: plan.fallback().orbit_side }
     }
 }
 

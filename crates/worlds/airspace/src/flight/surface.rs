@@ -111,12 +111,13 @@ impl Surface {
         }
     }
 
-    /// Returns the frame in which an airplane flies an orbit: the plane itself, or the frame at the center of the
-    /// orbit. In that one the orbit is a circle about the origin, and so it is one and the same on the earth, however
-    /// long it is flown.
-    pub(crate) fn orbit_frame(self, pose: Pose2, v_m_s: f64, omega_rad_s: f64) -> Frame {
+    /// Returns the frame in which an airplane flies a fallback: the plane itself; the frame at the center of an orbit, in
+    /// which the orbit is a circle about the origin; or, if it does not turn, the frame where it is, in which a geodesic
+    /// is straight. So the path is one and the same on the earth, however long it is flown.
+    pub(crate) fn fallback_frame(self, pose: Pose2, v_m_s: f64, omega_rad_s: f64) -> Frame {
         match self {
             Self::Plane => Frame::PLANE,
+            Self::Earth if omega_rad_s == 0.0 => self.frame_at(pose.at),
             Self::Earth => {
                 let frame = self.frame_at(pose.at);
                 let radius_m = v_m_s / omega_rad_s;

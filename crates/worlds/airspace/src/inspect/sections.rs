@@ -6,7 +6,7 @@ use crate::decide::decide_centrally;
 use crate::events::EventKind;
 use crate::flight::{Point, Pose2};
 use crate::method::MethodKind;
-use crate::shield::{OrbitSide, TurnProfile};
+use crate::shield::{Fallback, OrbitSide, TurnProfile};
 use crate::trace::InspectionTrace;
 use sidestep_kernel::view::{
     FactSection, FactTable, FactValue, Inspection, MarkRole, MarkShape, Vec3,
@@ -101,7 +101,7 @@ impl Inspector<'_> {
         let flies = match decision.candidate {
             Some(0) => "what it wants".into(),
             Some(k) => format!("another way: number {} of {}", k + 1, self.trace.profiles.len()),
-            None => "its stored orbit".into(),
+            None => "its stored fallback".into(),
         };
         let threat = self
             .trace
@@ -112,13 +112,14 @@ impl Inspector<'_> {
         for &other in &self.trace.blockers {
             table.push_row([airplane(other).into()]);
         }
-        let orbit = aircraft.orbit(aircraft.fallback);
+        let path = aircraft.fallback_path(aircraft.fallback);
+        let orbit = path.orbit();
         inspection.add_section(
             FactSection::new("Shield")
                 .fact("lets it fly", flies)
                 .fact("because of", self.trace.blockers.first().map(|&other| airplane(other)))
-                .fact("stored orbit", side_text(aircraft.fallback))
-                .fact("orbit after that", side_text(decision.fallback))
+                .fact("stored fallback", fallback_text(aircraft.fallback, aircraft.dt_s))
+                .fact("fallback after that", fallback_text(decision.fallback, aircraft.dt_s))
                 .fact("radius of the orbit", FactValue::meters(orbit.radius_m))
                 .fact("named with", FactValue::count(aircraft.exempt.len()))
                 .fact_if("can be reached by", threat.map(|event| airplane(event.other)))
@@ -128,7 +129,7 @@ impl Inspector<'_> {
         let radius_m = orbit.radius_m;
         inspection.add_mark(
             MarkRole::Orbit,
-            side_text(aircraft.fallback),
+            fallback_text(aircraft.fallback, aircraft.dt_s),
             MarkShape::Circle { at_m, radius_m },
         );
         if decision.candidate != Some(0)
@@ -221,6 +222,18 @@ fn network_traffic_row(about: &str, traffic: NetworkTraffic) -> [FactValue; 5] {
         FactValue::number(traffic.multicasts as f64, ""),
         FactValue::number(traffic.multicast_bytes as f64, "B"),
     ]
+}
+
+fn fallback_text(fallback: Fallback, dt_s: f64) -> String {
+    let Fallback { turn_side, turn_cycles, straight_cycles, orbit_side } = fallback;
+    let mut text = String::new();
+    if turn_cycles > 0 {
+        text += &format!("turn {} for {} s, ", side_text(turn_side), f64::from(turn_cycles) * dt_s);
+    }
+    if straight_cycles > 0 {
+        text += &format!("straight on for {} s, ", f64::from(straight_cycles) * dt_s);
+    }
+    text + "orbit " + side_text(orbit_side)
 }
 
 fn side_text(side: OrbitSide) -> &'static str {

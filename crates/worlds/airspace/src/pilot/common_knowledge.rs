@@ -6,7 +6,7 @@ use crate::agents::traffic_state::{LastKnownState, OrbitState, StateBeacon, Traf
 use crate::agents::{CommonKnowledge, FiledFlight, Ownship};
 use crate::flight::{FlightLevelRange, KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::shield::{OrbitSide, PlanCertainty, ShieldedAircraft};
+use crate::shield::{Fallback, OrbitSide, PlanCertainty, ShieldedAircraft};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{EntityId, math};
 use std::sync::Arc;
@@ -95,7 +95,7 @@ fn state_from_flight_plan(world: &AirspaceWorld, id: EntityId) -> LastKnownState
     let i = id as usize;
     let heard_in = world.appearance_cycle(i);
     let pose = world.airplanes[i].start;
-    let orbiting = OrbitState { pose, as_of: heard_in, side: world.first_fallbacks[i] };
+    let orbiting = OrbitState { pose, as_of: heard_in, side: world.first_fallbacks[i].orbit_side };
     let altitude_m = world.airplanes[i].altitude_m;
     let known = KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m };
     LastKnownState {
@@ -176,7 +176,9 @@ fn shielded_aircraft_from_report(
         levels: FlightLevelRange::between(one.altitude_m, segment.altitude_m),
         vertical_m: world.vertical_m,
         // The side of one that flies a profile is not visible; the exchange tries both.
-        fallback: one.orbit.unwrap_or(OrbitSide::Left),
+        fallback: Fallback::from_side(one.orbit.unwrap_or(OrbitSide::Left)),
+        choices: Arc::clone(&world.fallbacks[one.id as usize]),
+        dt_s: world.timing.dt_s,
         exempt: exempt.into(),
         // Ranks are known from proposals only.
         rank: 0,

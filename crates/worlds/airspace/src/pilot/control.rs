@@ -6,7 +6,7 @@ use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
 use crate::decide::ManeuverCandidates;
 use crate::events::Event;
-use crate::shield::{OrbitSide, ShieldDecision, TurnProfile};
+use crate::shield::{Fallback, ShieldDecision, TurnProfile};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -42,10 +42,10 @@ pub enum Maneuver {
         candidate: u32,
         /// Turn rate in each step.
         profile: TurnProfile,
-        /// Side of the fallback that it stores for the end of the profile.
-        side: OrbitSide,
+        /// The fallback that it stores for the end of the profile.
+        fallback: Fallback,
     },
-    /// Its stored orbit.
+    /// Its stored fallback.
     Orbit,
 }
 
@@ -93,19 +93,19 @@ impl Maneuver {
             Some(candidate) => Self::Profile {
                 candidate: candidate as u32,
                 profile: candidates.profiles[candidate].clone(),
-                side: decision.fallback,
+                fallback: decision.fallback,
             },
             None => Self::Orbit,
         }
     }
 
-    /// Returns the maneuver as a decision of the shield; `fallback` is the side of the stored orbit.
-    pub(crate) fn to_shield_decision(&self, fallback: OrbitSide) -> ShieldDecision {
+    /// Returns the maneuver as a decision of the shield; `stored` is the stored fallback.
+    pub(crate) fn to_shield_decision(&self, stored: Fallback) -> ShieldDecision {
         match *self {
-            Self::Profile { candidate, side, .. } => {
-                ShieldDecision { candidate: Some(candidate as usize), fallback: side }
+            Self::Profile { candidate, fallback, .. } => {
+                ShieldDecision { candidate: Some(candidate as usize), fallback }
             }
-            Self::Orbit => ShieldDecision { candidate: None, fallback },
+            Self::Orbit => ShieldDecision { candidate: None, fallback: stored },
         }
     }
 }
@@ -123,7 +123,7 @@ impl OptimizationStatus {
 }
 
 impl AirplaneControl {
-    /// Returns a control by which an airplane stays on its orbit: what it flies unless something else is decided.
+    /// Returns a control by which an airplane stays on its fallback: what it flies unless something else is decided.
     pub(crate) fn stay_on_orbit(id: EntityId, cycle: Cycle, memory: PilotMemory) -> Self {
         Self {
             id,

@@ -5,10 +5,11 @@ pub use crate::agents::grouping::SurveillanceReport;
 use crate::external_action::ExternalAction;
 use crate::flight::{FlightLevelRange, InterOrderSegment, KnownAircraft, Pose2, Surface};
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::shield::{OrbitSide, OrbitTracker, ShieldedAircraft, TurnProfile};
+use crate::shield::{Fallback, OrbitTracker, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
+use std::sync::Arc;
 
 /// Distance in meters beyond which all goals rank alike: about half of the range of a rank's 32 bits, of which
 /// refusals have the other half.
@@ -38,13 +39,13 @@ pub struct Percept {
 pub struct OwnshipState {
     /// Its id, by which the filed flights are found.
     pub id: EntityId,
-    /// Its pose by its own instruments, by which it keeps to its orbit.
+    /// Its pose by its own instruments, by which it keeps to its fallback.
     pub pose: Pose2,
-    /// The pose that it would have on its stored orbit without errors of heading.
+    /// The pose that it would have on its stored fallback without errors of heading.
     pub orbit_pose: Pose2,
     /// Its pose as all see it, from which it plans.
     pub seen: Pose2,
-    /// Its pose on the stored orbit, as all see it.
+    /// Its pose on the stored fallback, as all see it.
     pub seen_orbit_pose: Pose2,
     /// Altitude in meters.
     pub altitude_m: f64,
@@ -54,8 +55,8 @@ pub struct OwnshipState {
     pub next: u32,
     /// Number of orders executed.
     pub orders: u32,
-    /// Side of its stored fallback, the orbit that it may fly at any time.
-    pub fallback: OrbitSide,
+    /// Its stored fallback, which it may fly at any time.
+    pub fallback: Fallback,
     /// Number of times that the shield has refused its preferred action.
     pub refusals: u32,
     /// The others with which it is an exempt pair, by rising id: the shield guarantees nothing for these pairs.
@@ -87,6 +88,8 @@ impl OwnshipState {
             levels: self.levels,
             vertical_m: world.vertical_m,
             fallback: self.fallback,
+            choices: Arc::clone(&world.fallbacks[self.id as usize]),
+            dt_s: world.timing.dt_s,
             exempt: self.exempt.as_slice().into(),
             rank: self.priority_rank(world.surface, world.timing.dt_s, &segment),
         }
@@ -110,19 +113,18 @@ impl OwnshipState {
         u64::from(first) << 32 | u64::from(!self.id)
     }
 
-    /// Returns the turn profile by which it keeps to its stored orbit for one `dt`.
-    pub(crate) fn orbit_profile(&self, world: &AirspaceWorld) -> TurnProfile {
-        let rate_rad_s = world.orbit_rad_s[self.id as usize];
+    /// Returns the turn profile by which it keeps to its stored fallback for one `dt`.
+    pub(crate) fn fallback_profile(&self, world: &AirspaceWorld) -> TurnProfile {
+        let omega_rad_s = self.fallback.omega_rad_s(world.orbit_rad_s[self.id as usize]);
         let steps = world.timing.points_per_dt();
         let gust_rad = world.bounds.heading_rad;
         if gust_rad == 0.0 {
-            return TurnProfile { omegas_rad_s: vec![self.fallback.sign() * rate_rad_s; steps] };
+            return TurnProfile { omegas_rad_s: vec![omega_rad_s; steps] };
         }
         let model = world.segment(self.id, self.orders).model;
-        let omega_rad_s = self.fallback.sign() * rate_rad_s;
-        let frame = world.surface.orbit_frame(self.orbit_pose, model.v_m_s, omega_rad_s);
+        let frame = world.surface.fallback_frame(self.orbit_pose, model.v_m_s, omega_rad_s);
         let [pose, orbit_pose] = [self.pose, self.orbit_pose].map(|pose| frame.pose_to_local(pose));
-        let tracker = OrbitTracker::new(pose, orbit_pose, model, rate_rad_s, self.fallback);
+        let tracker = OrbitTracker::new(pose, orbit_pose, model, omega_rad_s);
         TurnProfile { omegas_rad_s: tracker.turn_rates_rad_s(steps, world.timing.dtau_s, gust_rad) }
     }
 }

@@ -181,7 +181,7 @@ impl Pilot {
         Some((control, self.state.take()?.candidates))
     }
 
-    /// Returns its control where its group does not come to an end in the present cycle: it stays on its orbit.
+    /// Returns its control where its group does not come to an end in the present cycle: it stays on its fallback.
     ///
     /// # Panics
     /// When it has not begun a cycle.
@@ -435,5 +435,5 @@ fn allowed_profiles(
     let aircraft = percept.own.shielded_aircraft(world);
     let avoidance =
         NonCooperativeAvoidance::new(&aircraft, &percept.non_cooperative, world.timing.dtau_s);
-    avoidance.allowed_profiles(&candidates.profiles, || percept.own.orbit_profile(world))
+    avoidance.allowed_profiles(&candidates.profiles, || percept.own.fallback_profile(world))
 }

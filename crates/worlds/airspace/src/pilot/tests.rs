@@ -96,7 +96,7 @@ fn a_sight_holds_nothing_of_others_that_cannot_be_seen() {
             (*next, *overrides, *orbits) = (1 - (*next).min(1), *overrides + 7, *orbits + 3);
             airplane.turn_rate_rad_s += 0.01;
             if *orbiting == 0 {
-                airplane.fallback = crate::shield::OrbitSide::BOTH[1 - airplane.fallback as usize];
+                airplane.fallback.orbit_side = airplane.fallback.orbit_side.opposite();
                 hidden += 1;
             }
             snapshot.resolving[id] = crate::baseline::mvp::ActiveResolutions::default();

@@ -8,7 +8,7 @@ use crate::flight::{TimeDiscretization, WaypointRule};
 use crate::method::{MethodKind, OwnMethod};
 use crate::perceive::observed_pose;
 use crate::settings::{BuiltInMethod, Deployment, Disturbance, Grouping, ReactiveSettings};
-use crate::shield::{ErrorBounds, ExemptIds, OrbitSide, ShieldedAircraft, first_fallbacks};
+use crate::shield::{ErrorBounds, ExemptIds, Fallback, ShieldedAircraft, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::network::fingerprint;
@@ -76,7 +76,7 @@ impl<'a> Compiler<'a> {
         let (fallbacks, too_close) = if world.shield {
             first_fallbacks_of(&world)
         } else {
-            (vec![OrbitSide::default(); world.airplanes.len()], Vec::new())
+            (vec![Fallback::default(); world.airplanes.len()], Vec::new())
         };
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
@@ -159,6 +159,7 @@ impl<'a> Compiler<'a> {
             orbit_rad_s: Arc::default(),
             top_m_s: Arc::default(),
             alone_s: Arc::default(),
+            fallbacks: Arc::default(),
             first_fallbacks: Arc::default(),
             teams: Arc::default(),
             later_rules: Arc::default(),
@@ -427,10 +428,10 @@ fn last_change_s(world: &AirspaceWorld, i: usize) -> f64 {
 }
 
 /// Returns first fallbacks that are apart as far as possible, and the pairs that are not apart.
-fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<OrbitSide>, Vec<(u32, u32)>) {
-    let mut sides = vec![OrbitSide::default(); world.airplanes.len()];
+fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Fallback>, Vec<(u32, u32)>) {
+    let mut fallbacks = vec![Fallback::default(); world.airplanes.len()];
     // Airplanes that enter at other times do not meet at the start.
-    let starts: Vec<usize> = (0..sides.len())
+    let starts: Vec<usize> = (0..fallbacks.len())
         .filter(|&i| world.first_controlled_cycle(i) == 0 && !world.is_non_cooperative(i as u32, 0))
         .collect();
     let mut group = Vec::with_capacity(starts.len());
@@ -447,17 +448,19 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<OrbitSide>, Vec<(u32, u32)>
             error_m: world.error_m(i),
             levels: FlightLevelRange::from_level(airplane.altitude_m),
             vertical_m: world.vertical_m,
-            fallback: OrbitSide::Left,
+            fallback: Fallback::default(),
+            choices: Arc::clone(&world.fallbacks[i]),
+            dt_s: world.timing.dt_s,
             exempt: ExemptIds::default(),
             rank: rank as u64,
             id: i as u32,
         });
     }
     let (chosen, pairs) = first_fallbacks(&group);
-    for (&i, side) in starts.iter().zip(chosen) {
-        sides[i] = side;
+    for (&i, fallback) in starts.iter().zip(chosen) {
+        fallbacks[i] = fallback;
     }
-    (sides, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
+    (fallbacks, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
 }
 
 /// Returns the speed of an airplane's model and those of its orders.

@@ -9,14 +9,14 @@
 //! e = L^3 / (3 R^2),  L = (R_max + 2 r_max) / 2 + r_max
 //! ```
 //!
-//! for each of the two airplanes, with the largest separation `R_max` and the largest reach `r_max` (one `dt` of flight
-//! and the diameter of an orbit) of all airplanes, and the smallest radius of curvature of the ellipsoid: farther apart
+//! for each of the two airplanes, with the largest separation `R_max` and the largest reach `r_max` (one `dt` of flight,
+//! the longest way until an orbit begins, and the diameter of an orbit) of all airplanes, and the smallest radius of curvature of the ellipsoid: farther apart
 //! than `R_max + 2 r_max` no two are compared. New plans keep `2 e` more than the separation, as for errors of position
 //! (`errors.rs`). Sampled pairs are off by less than half of that (a test), so that what is flown on the earth, and what
 //! is measured in the planes of later steps, both keep the separation.
 //!
 //! **Forever.** A stored orbit is kept as a pose on the earth, and flown as a circle about its center there, at a fixed
-//! rate (`Surface::orbit_frame`). So it is the same circle at all times and in whichever pair it is compared, and the
+//! rate (`Surface::fallback_frame`). So it is the same circle at all times and in whichever pair it is compared, and the
 //! error of a comparison does not grow with the time that the orbit is flown.
 //!
 //! **Wind.** A wind is not part of this, and no wider margin would make it so. In a plane it moves all alike and changes
@@ -87,7 +87,7 @@ mod tests {
             let dt_s = std::f64::consts::TAU / 0.018 / f64::from(steps);
             let mut pose = start;
             for _ in 0..turns * steps {
-                let frame = Surface::Earth.orbit_frame(pose, v_m_s, omega_rad_s);
+                let frame = Surface::Earth.fallback_frame(pose, v_m_s, omega_rad_s);
                 pose = frame.pose_to_world(frame.pose_to_local(pose).step(v_m_s, omega_rad_s, dt_s));
             }
             let off_m = Surface::Earth.distance_m(start.at, pose.at);

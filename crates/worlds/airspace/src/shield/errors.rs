@@ -11,8 +11,8 @@
 //! search never asks it of them. So the induction holds with this wider gap on new plans.
 //!
 //! **Headings.** A turn profile is flown for one `dt` from a heading that is seen, so no gust disturbs it.
-//! An orbit is flown forever. Airplanes orbit at less than their largest turn rate and have the
-//! rest, `a`, to correct ([`OrbitTracker::turn_rates_rad_s`]). Let `D` be the bound, `v` the speed, and let `held` be the pose
+//! A fallback is flown forever. Airplanes orbit, and turn before it, at less than their largest turn rate and have the
+//! rest, `a`, to correct, straight on even more ([`OrbitTracker::turn_rates_rad_s`]). Let `D` be the bound, `v` the speed, and let `held` be the pose
 //! on the orbit that was stored, moved along it. At the start of each `dt` on it
 //!
 //! - the airplane heads within `2 D` of `held`: at the end of a profile by at most one gust of `D`;
@@ -25,7 +25,6 @@
 //! changes by at most `2 v sin(D) dt <= 2 v dt D`. So it is within `W = 6 v dt D` of its orbit, and
 //! gaps wider by `W` on either side keep `R`.
 
-use super::orbit::OrbitSide;
 use crate::flight::{AircraftModel, Pose2};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math;
@@ -52,7 +51,7 @@ pub struct ErrorBounds {
 
 impl ErrorBounds {
     /// Returns the distance in meters within which an airplane is of where it should be at the
-    /// start of a `dt` on its orbit.
+    /// start of a `dt` on its fallback.
     pub(crate) fn max_deviation_m(&self, v_m_s: f64, dt_s: f64) -> f64 {
         4.0 * v_m_s * dt_s * self.heading_rad
     }
@@ -89,7 +88,7 @@ pub(crate) fn common_orbit_rates(max_rates_rad_s: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// An airplane on its orbit.
+/// An airplane on its fallback.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OrbitTracker {
     pub(crate) pose: Pose2,
@@ -102,16 +101,15 @@ pub(crate) struct OrbitTracker {
 }
 
 impl OrbitTracker {
-    /// Returns the orbiting airplane that flies with these abilities to a side.
+    /// Returns the airplane that flies with these abilities at a turn rate.
     pub(crate) fn new(
         pose: Pose2,
         orbit_pose: Pose2,
         model: &AircraftModel,
-        rate_rad_s: f64,
-        side: OrbitSide,
+        orbit_rad_s: f64,
     ) -> Self {
         let AircraftModel { v_m_s, omega_max_rad_s, .. } = *model;
-        Self { pose, orbit_pose, v_m_s, omega_max_rad_s, orbit_rad_s: side.sign() * rate_rad_s }
+        Self { pose, orbit_pose, v_m_s, omega_max_rad_s, orbit_rad_s }
     }
 
     /// Returns the turn rates by which it keeps to its orbit for some steps, in spite of gusts that
@@ -144,6 +142,7 @@ impl OrbitTracker {
 mod tests {
     use super::*;
     use crate::flight::distance_m;
+    use crate::shield::OrbitSide;
     use proptest::prelude::*;
 
     #[test]
@@ -167,7 +166,7 @@ mod tests {
             let bounds = ErrorBounds { position_m: 0.0, heading_rad: gust_rad };
             let rate = bounds.max_orbit_rate_rad_s(&model, dt_s).expect("within what can be held");
             let start = Pose2 { at: [0.0, 0.0], heading_rad: 1.0 };
-            let mut now = OrbitTracker::new(start, start, &model, rate, OrbitSide::BOTH[usize::from(left)]);
+            let mut now = OrbitTracker::new(start, start, &model, rate * OrbitSide::BOTH[usize::from(left)].sign());
             let steps = (dt_s / dtau) as usize;
             for (k, gust) in gusts.iter().enumerate() {
                 // Outward, by turns, always to one side, or by chance.

@@ -1,13 +1,14 @@
 //! The shield: a filter that provably keeps airplanes apart.
 //!
 //! It stands between any method and the airplanes. Every airplane stores a *fallback* that it can
-//! fly forever: an orbit to the left or to the right.
+//! fly forever: an orbit to the left or to the right, or a turn, straight flight, and then an orbit (`fallback.rs`).
+//! Level flight straight on is what passes another airplane, or flies beside it; the orbit keeps it within reach.
 //!
 //! **Invariant.** The stored fallbacks of any two airplanes that are not *exempt* as a pair are at
 //! least `R` apart, from now on and for all time, unless the two are on levels that do not meet.
 //!
-//! Each `dt` every airplane is given a *plan*: some turn rates for `dt`, and then an orbit from where those
-//! end. Plans are *compatible* when they stay `R` apart during `dt` and on the orbits forever
+//! Each `dt` every airplane is given a *plan*: some turn rates for `dt`, and then a fallback from where those
+//! end. Plans are *compatible* when they stay `R` apart during `dt` and on the fallbacks forever
 //! after it, or when the pair need not be kept apart: it is exempt, or the levels that the two keep
 //! or pass do not meet. [`filter_maneuvers`] assigns plans that are pairwise compatible:
 //!
@@ -16,25 +17,25 @@
 //!    speaks. So an assignment of compatible plans exists.
 //! 2. *Search.* Each airplane starts with the plan that the method proposes. While some pair is
 //!    not compatible, one of the two, the one with the lower rank unless it is on its fallback already, takes another
-//!    plan that is compatible with all present ones, or its fallback; or it and those with which it is not compatible
-//!    turn to one side together, if that makes them compatible with all. The first and the last lower the number of
+//!    plan that is compatible with all present ones, if others, too, may end with other fallbacks that are compatible
+//!    with all; or else it stays on its fallback. The first lowers the number of
 //!    incompatible pairs, the second raises the number of airplanes on fallbacks, and none leaves a fallback during
 //!    the search, so it ends. It can only end without an incompatible pair, because two airplanes on fallbacks are
 //!    compatible by the invariant.
-//! 3. *Better again.* An airplane that has fallen back may take another plan if that is compatible
-//!    with all present ones. Each such exchange keeps all pairs compatible.
-//! 4. *Step.* All fly `dt` of their plans, and store the orbit at its end. The plans were
-//!    compatible, so no two came nearer than `R` during `dt`, and the stored orbits keep the
+//! 3. *Better again.* An airplane that does not fly its first candidate may take a better one in the same way. Each such
+//!    exchange keeps all pairs compatible.
+//! 4. *Step.* All fly `dt` of their plans, and store the fallback at its end. The plans were
+//!    compatible, so no two came nearer than `R` during `dt`, and the stored fallbacks keep the
 //!    invariant.
 //! 5. *Changes.* Between two `dt` a pair comes under the invariant in three ways, and never without
-//!    orbits that are apart: one of the two enters, and chooses an orbit apart from the other's,
+//!    fallbacks that are apart: one of the two enters, and chooses a fallback apart from the other's,
 //!    or else the pair is exempt (`entry_fallbacks`); one is ordered to a speed, or passes levels in the next `dt`,
-//!    which it does only as far as it has an orbit apart from those of all that it then has to avoid, regardless of
-//!    other exempt pairs (`safe_orbit_side`, `next_altitude`); or the exemption of the pair ends, which it does
-//!    once their orbits are apart (`act/entry.rs`). An airplane that leaves the world keeps every other pair as it was.
+//!    which it does only as far as it has a fallback apart from those of all that it then has to avoid, regardless of
+//!    other exempt pairs (`safe_fallback`, `next_altitude`); or the exemption of the pair ends, which it does
+//!    once their fallbacks are apart (`act/entry.rs`). An airplane that leaves the world keeps every other pair as it was.
 //! 6. *Levels.* An airplane can level off at any time, so between two `dt` it occupies its own level alone. Then those
 //!    that change it are cleared one after the other, each with regard to the levels that those before it pass: from
-//!    those that it meets anew its orbit has to be apart, and those that it has met already are apart by the
+//!    those that it meets anew its fallback has to be apart, and those that it has met already are apart by the
 //!    invariant, or because they were cleared with regard to it.
 //!
 //! By induction over `dt` no pair that is not exempt ever loses separation. In a plane, a wind that all know
@@ -43,13 +44,15 @@
 //! heading add to `R`, and `avoid.rs` the guarantee beside non-cooperative aircraft. Each step is
 //! a property test in `tests.rs`, the whole one in `guarantee_tests.rs`.
 //!
-//! Airplanes that turn at different rates orbit at one rate, which all can fly (`common_rates`).
+//! Airplanes that turn at different rates orbit at one rate, which all can fly (`common_orbit_rates`).
 //! Then plans of airplanes that pass each other are nearly always compatible, and the shield costs
-//! little (`delay_tests.rs`).
+//! little (`delay_tests.rs`). Where messages get lost, fallbacks are orbits alone: an airplane is seen to orbit, and to
+//! which side, and so others know its fallback without hearing of it.
 //!
-//! Numbers: `orbit.rs` never wrongly finds that motions stay apart. New plans must keep slightly
+//! Numbers: `orbit.rs` and `fallback.rs` never wrongly find that motions stay apart. New plans must keep slightly
 //! more than `R` (by `MARGIN_M`), so that rounding never adds up to a loss.
 
+mod change;
 mod curvature;
 #[cfg(test)]
 mod delay_tests;
@@ -57,6 +60,7 @@ mod errors;
 mod fallback;
 #[cfg(test)]
 pub(crate) mod guarantee_tests;
+mod neighbors;
 mod orbit;
 mod safe_maneuver;
 mod search;
@@ -64,16 +68,17 @@ mod shielded_aircraft;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use change::{
+    altitude_short_of, entry_fallbacks, first_fallbacks, next_altitude, safe_fallback,
+};
 pub(crate) use curvature::curvature_error_m;
 pub use errors::ErrorBounds;
 pub(crate) use errors::{OrbitTracker, common_orbit_rates};
-pub(crate) use fallback::{
-    altitude_short_of, entry_fallbacks, first_fallbacks, next_altitude, safe_orbit_side,
-};
+pub use fallback::Fallback;
 pub use orbit::OrbitSide;
 pub(crate) use orbit::stays_apart_for;
 pub(crate) use safe_maneuver::SafeManeuver;
 pub use safe_maneuver::TurnProfile;
-pub use search::{PlanCertainty, ShieldDecision, filter_maneuvers};
+pub use search::{PlanCertainty, PlanRules, ShieldDecision, filter_maneuvers};
 pub(crate) use shielded_aircraft::ExemptIds;
 pub use shielded_aircraft::ShieldedAircraft;

@@ -5,7 +5,7 @@
 //! opposite ones a common period that is searched the same way, and of any others are kept apart
 //! as whole circles.
 
-use crate::flight::{PairPlane, Point, Pose2, RigidMotion, distance_m};
+use crate::flight::{Point, Pose2, RigidMotion, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
 use sidestep_kernel::math;
@@ -87,17 +87,15 @@ impl Orbit {
         Self { center, radius_m, omega_rad_s, phase_rad: to_center_rad + std::f64::consts::PI }
     }
 
-    /// Returns two orbits, each in a frame of its own, in the plane of the pair.
-    pub(crate) fn both_in_plane(plane: &PairPlane, [a, b]: [Self; 2]) -> [Self; 2] {
-        match plane.motions() {
-            None => [a, b],
-            Some([first, second]) => [a.moved(first), b.moved(second)],
-        }
-    }
-
-    fn moved(&self, motion: &RigidMotion) -> Self {
+    /// Returns what becomes of it in a motion of the plane.
+    pub(super) fn moved(&self, motion: &RigidMotion) -> Self {
         let center = motion.point(self.center);
         Self { center, phase_rad: motion.angle_rad(self.phase_rad), ..*self }
+    }
+
+    /// Returns the same orbit with times that start some seconds later.
+    pub(super) fn after(&self, t_s: f64) -> Self {
+        Self { phase_rad: self.phase_rad + self.omega_rad_s * t_s, ..*self }
     }
 
     /// Returns the airplane's position on it.

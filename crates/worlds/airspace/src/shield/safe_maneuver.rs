@@ -1,10 +1,12 @@
-//! Plans: turn rates for one `dt`, and then an orbit forever.
+//! Plans: turn rates for one `dt`, and then a fallback forever.
 
-use super::orbit::{Orbit, OrbitSide, stays_apart_for};
+use super::fallback::{Fallback, FallbackPath};
+use super::orbit::stays_apart_for;
 use super::shielded_aircraft::ShieldedAircraft;
 use crate::flight::{Frame, PairPlane, Point, Pose2, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::interrupt;
+use std::sync::Arc;
 
 /// Motion for one `dt`: a turn rate per step of `dtau`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -13,113 +15,57 @@ pub struct TurnProfile {
     pub omegas_rad_s: Vec<f64>,
 }
 
-/// The motion of one `dt`, and an orbit on which the airplane waits after that.
+/// The motion of one `dt`, and a fallback on which the airplane waits after that.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SafeManeuver {
+    /// Shared by plans that differ in their fallbacks alone.
+    motion: Arc<ProfileMotion>,
+    /// What `path` is the path of.
+    fallback: Fallback,
+    /// The path after `dt`.
+    path: FallbackPath,
+    /// Number of the candidate, `None` for the stored fallback.
+    pub(super) candidate: Option<usize>,
+}
+
+/// The motion of an airplane in one `dt`.
+#[derive(Debug, PartialEq)]
+struct ProfileMotion {
     aircraft: ShieldedAircraft,
     /// Poses at the start of each step, and at the end, in the frame of the airplane.
     poses: Vec<Pose2>,
     omegas_rad_s: Vec<f64>,
     dtau_s: f64,
-    orbit: Orbit,
-    /// Number of the candidate, `None` for the fallback.
-    pub(super) candidate: Option<usize>,
-    pub(super) side: OrbitSide,
 }
 
-impl SafeManeuver {
-    /// Returns a plan: a turn profile, and then an orbit to a side.
-    pub(crate) fn new(
-        aircraft: ShieldedAircraft,
-        profile: &TurnProfile,
-        dtau_s: f64,
-        side: OrbitSide,
-    ) -> Self {
-        Self::from_candidate(aircraft, profile, dtau_s, None, side)
-    }
-
-    /// Returns the same for a candidate, by its number.
-    pub(super) fn from_candidate(
-        aircraft: ShieldedAircraft,
-        profile: &TurnProfile,
-        dtau_s: f64,
-        candidate: Option<usize>,
-        side: OrbitSide,
-    ) -> Self {
-        let flown = Self::from_turn_rates(
-            aircraft.local_pose(),
-            aircraft,
-            profile.omegas_rad_s.clone(),
-            dtau_s,
-            side,
-        );
-        Self { candidate, ..flown }
-    }
-
-    /// Returns the same plan with an orbit to a side.
-    pub(super) fn with_side(&self, side: OrbitSide) -> Self {
-        let omega_rad_s = side.sign() * self.aircraft.orbit_rad_s;
-        let orbit = Orbit::from_pose(self.end_pose(), self.aircraft.v_m_s, omega_rad_s);
-        Self { orbit, side, ..self.clone() }
-    }
-
-    fn from_turn_rates(
-        start: Pose2,
-        aircraft: ShieldedAircraft,
-        omegas_rad_s: Vec<f64>,
-        dtau_s: f64,
-        side: OrbitSide,
-    ) -> Self {
-        let mut poses = vec![start];
+impl ProfileMotion {
+    fn new(start: Pose2, aircraft: ShieldedAircraft, omegas_rad_s: Vec<f64>, dtau_s: f64) -> Self {
+        let mut poses = Vec::with_capacity(omegas_rad_s.len() + 1);
+        let mut pose = start;
+        poses.push(pose);
         for &omega in &omegas_rad_s {
-            let last = poses[poses.len() - 1];
-            poses.push(last.step(aircraft.v_m_s, omega, dtau_s));
+            pose = pose.step(aircraft.v_m_s, omega, dtau_s);
+            poses.push(pose);
         }
-        let end = poses[poses.len() - 1];
-        let orbit = Orbit::from_pose(end, aircraft.v_m_s, side.sign() * aircraft.orbit_rad_s);
-        Self { aircraft, poses, omegas_rad_s, dtau_s, orbit, candidate: None, side }
+        Self { aircraft, poses, omegas_rad_s, dtau_s }
     }
 
-    /// Returns the stored fallback as a plan, for some steps and forever after them.
-    pub(crate) fn fallback(aircraft: ShieldedAircraft, steps: usize, dtau_s: f64) -> Self {
-        let omega = aircraft.fallback.sign() * aircraft.orbit_rad_s;
-        let side = aircraft.fallback;
-        let start = aircraft.frame.pose_to_local(aircraft.orbit_pose);
-        Self::from_turn_rates(start, aircraft, vec![omega; steps], dtau_s, side)
-    }
-
-    /// Returns the frame in which it is flown.
-    pub(crate) fn frame(&self) -> Frame {
-        self.aircraft.frame
-    }
-
-    /// Returns the pose at the end of `dt`, where the orbit begins, in the frame of the airplane.
-    pub(crate) fn end_pose(&self) -> Pose2 {
+    fn end_pose(&self) -> Pose2 {
         self.poses[self.poses.len() - 1]
     }
 
-    pub(crate) fn side(&self) -> OrbitSide {
-        self.side
-    }
-
-    /// Returns whether two plans stay apart during `dt` and on the orbits forever after it.
-    pub(crate) fn is_compatible(&self, other: &Self) -> bool {
-        let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
-        if !self.aircraft.is_protected_from(&other.aircraft)
-            || !self.aircraft.can_come_too_near(&other.aircraft, dt_s)
-        {
+    fn stays_apart(&self, other: &Self, plane: &PairPlane, gap_m: f64) -> bool {
+        let closing_m_s = self.aircraft.v_m_s + other.aircraft.v_m_s;
+        let pose_distance_m = |k: usize| plane.distance_m(self.poses[k].at, other.poses[k].at);
+        // Most pairs are too far apart to come too near within a `dt`, or within a step, however they fly.
+        if pose_distance_m(0) - closing_m_s * self.aircraft.dt_s >= gap_m {
             return true;
         }
-        let gap_m = self.aircraft.required_gap_m(&other.aircraft);
-        interrupt::check();
-        let plane = self.aircraft.pair_plane(&other.aircraft);
-        let [own, others] = Orbit::both_in_plane(&plane, [self.orbit, other.orbit]);
-        own.stays_apart(&others, gap_m) && self.profiles_stay_apart(other, &plane, gap_m)
-    }
-
-    fn profiles_stay_apart(&self, other: &Self, plane: &PairPlane, gap_m: f64) -> bool {
-        let closing_m_s = self.aircraft.v_m_s + other.aircraft.v_m_s;
         (0..self.omegas_rad_s.len()).all(|k| {
+            let sum_m = pose_distance_m(k) + pose_distance_m(k + 1);
+            if 0.5 * (sum_m - closing_m_s * self.dtau_s) >= gap_m {
+                return true;
+            }
             let apart_m = |t_s: f64| {
                 plane.distance_m(self.position_in_step(k, t_s), other.position_in_step(k, t_s))
             };
@@ -133,28 +79,109 @@ impl SafeManeuver {
     fn position_in_step(&self, step: usize, t_s: f64) -> Point {
         self.poses[step].step(self.aircraft.v_m_s, self.omegas_rad_s[step], t_s).at
     }
+}
+
+impl SafeManeuver {
+    /// Returns a plan: a turn profile, and then a fallback.
+    pub(crate) fn new(
+        aircraft: ShieldedAircraft,
+        profile: &TurnProfile,
+        dtau_s: f64,
+        fallback: Fallback,
+    ) -> Self {
+        Self::from_candidate(aircraft, profile, dtau_s, None, fallback)
+    }
+
+    /// Returns the same for a candidate, by its number.
+    pub(super) fn from_candidate(
+        aircraft: ShieldedAircraft,
+        profile: &TurnProfile,
+        dtau_s: f64,
+        candidate: Option<usize>,
+        fallback: Fallback,
+    ) -> Self {
+        let start = aircraft.local_pose();
+        let motion = ProfileMotion::new(start, aircraft, profile.omegas_rad_s.clone(), dtau_s);
+        Self { candidate, ..Self::from_motion(Arc::new(motion), fallback) }
+    }
+
+    fn from_motion(motion: Arc<ProfileMotion>, fallback: Fallback) -> Self {
+        let path = motion.aircraft.fallback_path_from(motion.end_pose(), fallback);
+        Self { motion, fallback, path, candidate: None }
+    }
+
+    /// Returns the same plan with another fallback.
+    pub(super) fn with_fallback(&self, fallback: Fallback) -> Self {
+        let changed = Self::from_motion(Arc::clone(&self.motion), fallback);
+        Self { candidate: self.candidate, ..changed }
+    }
+
+    /// Returns the stored fallback as a plan, for some steps and forever after them.
+    pub(crate) fn on_fallback(aircraft: ShieldedAircraft, steps: usize, dtau_s: f64) -> Self {
+        let omega = aircraft.fallback.omega_rad_s(aircraft.orbit_rad_s);
+        let rest = aircraft.fallback.after_cycle();
+        let start = aircraft.frame.pose_to_local(aircraft.orbit_pose);
+        let motion = ProfileMotion::new(start, aircraft, vec![omega; steps], dtau_s);
+        Self::from_motion(Arc::new(motion), rest)
+    }
+
+    fn aircraft(&self) -> &ShieldedAircraft {
+        &self.motion.aircraft
+    }
+
+    /// Returns the frame in which it is flown.
+    pub(crate) fn frame(&self) -> Frame {
+        self.aircraft().frame
+    }
+
+    /// Returns the pose at the end of `dt`, where its fallback begins, in the frame of the airplane.
+    pub(crate) fn end_pose(&self) -> Pose2 {
+        self.motion.end_pose()
+    }
+
+    /// Returns the fallback that begins there.
+    pub(crate) fn fallback(&self) -> Fallback {
+        self.fallback
+    }
+
+    /// Returns whether two plans stay apart during `dt` and on the fallbacks forever after it.
+    pub(crate) fn is_compatible(&self, other: &Self) -> bool {
+        let lead_s = [self, other].map(|plan| plan.path.lead_s());
+        let (own, others) = (self.aircraft(), other.aircraft());
+        if !own.is_protected_from(others) || !own.can_come_too_near(others, lead_s) {
+            return true;
+        }
+        let gap_m = own.required_gap_m(others);
+        interrupt::check();
+        let plane = own.pair_plane(others);
+        let [path, other_path] = FallbackPath::both_in_plane(&plane, [self.path, other.path]);
+        path.stays_apart(&other_path, gap_m)
+            && self.motion.stays_apart(&other.motion, &plane, gap_m)
+    }
 
     /// Returns whether it keeps apart from another airplane however that one flies, for one `dt`
-    /// and on orbits forever after it.
+    /// and on orbits forever after it. Of plans that do not orbit at once after that it is not known.
     pub(crate) fn is_clear_of(&self, other: &ShieldedAircraft) -> bool {
-        let dt_s = self.dtau_s * self.omegas_rad_s.len() as f64;
-        let (centers, radius_m) = other.reach_discs(dt_s);
-        let plane = self.aircraft.pair_plane(other);
-        let gap_m = radius_m + self.aircraft.required_gap_m(other);
+        if !self.fallback.is_orbiting() {
+            return false;
+        }
+        let ProfileMotion { aircraft, poses, dtau_s, .. } = &*self.motion;
+        let (centers, radius_m) = other.reach_discs(aircraft.dt_s);
+        let plane = aircraft.pair_plane(other);
+        let gap_m = radius_m + aircraft.required_gap_m(other);
         // Between two poses it is within half a step of one of them.
-        let half_step_m = 0.5 * self.aircraft.v_m_s * self.dtau_s;
+        let half_step_m = 0.5 * aircraft.v_m_s * dtau_s;
+        let orbit = self.path.orbit();
         centers.iter().all(|&center| {
-            let are_poses_clear = self
-                .poses
-                .iter()
-                .all(|pose| plane.distance_m(pose.at, center) >= gap_m + half_step_m);
-            let [orbit_center, center] = plane.points(self.orbit.center(), center);
-            are_poses_clear && distance_m(orbit_center, center) >= self.orbit.radius_m + gap_m
+            let are_poses_clear =
+                poses.iter().all(|pose| plane.distance_m(pose.at, center) >= gap_m + half_step_m);
+            let [orbit_center, center] = plane.points(orbit.center(), center);
+            are_poses_clear && distance_m(orbit_center, center) >= orbit.radius_m + gap_m
         })
     }
 
     /// Returns whether this is the stored fallback.
-    pub(super) fn is_fallback(&self) -> bool {
+    pub(super) fn is_on_fallback(&self) -> bool {
         self.candidate.is_none()
     }
 }

@@ -1,5 +1,6 @@
 //! An airplane as the shield knows it.
 
+use super::fallback::{Fallback, FallbackPath};
 use super::orbit::{Orbit, OrbitSide};
 use crate::flight::{FlightLevelRange, Frame, PairPlane, Point, Pose2, Surface, distance_m};
 use sidestep_kernel::EntityId;
@@ -21,7 +22,7 @@ pub struct ShieldedAircraft {
     pub frame: Frame,
     /// Its pose, as all see it, in coordinates of the scenario.
     pub pose: Pose2,
-    /// The pose that it would have on its stored orbit without errors of heading, as all see it.
+    /// The pose that it would have on its stored fallback without errors of heading, as all see it.
     pub orbit_pose: Pose2,
     /// Airspeed in meters per second.
     pub v_m_s: f64,
@@ -38,7 +39,11 @@ pub struct ShieldedAircraft {
     /// Difference of altitude in meters from which on airplanes need not avoid each other.
     pub vertical_m: f64,
     /// Its stored fallback.
-    pub fallback: OrbitSide,
+    pub fallback: Fallback,
+    /// The fallbacks that its plans may end with, in the order in which they are tried.
+    pub choices: Arc<[Fallback]>,
+    /// Length of a `dt` in seconds.
+    pub dt_s: f64,
     /// The others with which it entered too close: with each of them it is left to the method until their fallbacks
     /// are apart.
     pub exempt: Arc<[EntityId]>,
@@ -58,7 +63,7 @@ impl ShieldedAircraft {
     /// apart: the pair need no longer be exempt.
     pub(crate) fn is_safe_with(&self, other: &Self) -> bool {
         !self.is_on_same_level(other)
-            || self.do_orbits_stay_apart(self.fallback, other, other.fallback)
+            || self.do_fallbacks_stay_apart(self.fallback, other, other.fallback)
     }
 
     /// Returns its pose in its frame.
@@ -71,22 +76,33 @@ impl ShieldedAircraft {
         PairPlane::between(self.frame, other.frame)
     }
 
-    /// Returns the orbit to a side that it holds, or that it enters where it is, in its frame.
-    pub(crate) fn orbit(&self, side: OrbitSide) -> Orbit {
-        let pose = self.frame.pose_to_local(self.orbit_pose);
-        Orbit::from_pose(pose, self.v_m_s, side.sign() * self.orbit_rad_s)
+    /// Returns the fallback with which it enters: the stored one, unless that takes longer until it orbits than all that
+    /// it may choose, because other rules held when it was stored.
+    pub(super) fn entry_fallback(&self) -> Fallback {
+        let longest = self.choices.iter().map(|choice| choice.cycles_until_orbit()).max();
+        let is_within = Some(self.fallback.cycles_until_orbit()) <= longest;
+        if is_within { self.fallback } else { Fallback::from_side(self.fallback.orbit_side) }
     }
 
-    /// Returns whether its orbit to a side and that of another airplane stay apart forever.
-    pub(super) fn do_orbits_stay_apart(
+    /// Returns the path of a fallback that it holds, or that it enters where it is, in its frame.
+    pub(crate) fn fallback_path(&self, fallback: Fallback) -> FallbackPath {
+        self.fallback_path_from(self.frame.pose_to_local(self.orbit_pose), fallback)
+    }
+
+    /// Returns the path of a fallback that it enters at a pose in its frame.
+    pub(super) fn fallback_path_from(&self, pose: Pose2, fallback: Fallback) -> FallbackPath {
+        FallbackPath::new(pose, self.v_m_s, self.orbit_rad_s, fallback, self.dt_s)
+    }
+
+    /// Returns whether a fallback of it and one of another airplane stay apart forever.
+    pub(super) fn do_fallbacks_stay_apart(
         &self,
-        side: OrbitSide,
+        fallback: Fallback,
         other: &Self,
-        other_side: OrbitSide,
+        other_fallback: Fallback,
     ) -> bool {
-        let plane = self.pair_plane(other);
-        let [own, others] =
-            Orbit::both_in_plane(&plane, [self.orbit(side), other.orbit(other_side)]);
+        let paths = [self.fallback_path(fallback), other.fallback_path(other_fallback)];
+        let [own, others] = FallbackPath::both_in_plane(&self.pair_plane(other), paths);
         own.stays_apart(&others, self.required_gap_m(other))
     }
 
@@ -96,11 +112,36 @@ impl ShieldedAircraft {
         self.separation_m.max(other.separation_m) + self.error_m + other.error_m + MARGIN_M
     }
 
-    /// Returns whether some plans of `dt_s` seconds, and orbits after them, could bring two airplanes
-    /// too near each other.
-    pub(super) fn can_come_too_near(&self, other: &Self, dt_s: f64) -> bool {
-        let limit_m = self.required_gap_m(other) + self.reach_m(dt_s) + other.reach_m(dt_s);
+    /// Returns whether some plans of one `dt`, and fallbacks that orbit after this time, could bring two airplanes too near
+    /// each other.
+    pub(super) fn can_come_too_near(&self, other: &Self, lead_s: [f64; 2]) -> bool {
+        let limit_m = self.required_gap_m(other)
+            + self.reach_m(self.dt_s + lead_s[0])
+            + other.reach_m(other.dt_s + lead_s[1]);
+        self.is_within(other, limit_m)
+    }
+
+    /// Returns whether all see two airplanes nearer to each other than that.
+    pub(super) fn is_within(&self, other: &Self, limit_m: f64) -> bool {
         !self.frame.is_surely_beyond(&other.frame, limit_m) && self.apart_m(other) < limit_m
+    }
+
+    /// Returns the longest time until it orbits, on its stored fallback or on one that it may choose, in seconds.
+    fn max_lead_s(&self) -> f64 {
+        let choices = self.choices.iter().map(|choice| choice.cycles_until_orbit());
+        let cycles = choices.fold(self.fallback.cycles_until_orbit(), u32::max);
+        f64::from(cycles) * self.dt_s
+    }
+
+    /// Returns the distance from where it is seen within which its fallbacks, and the gap around them, lie, in meters.
+    pub(super) fn fallback_reach_m(&self) -> f64 {
+        // The error twice: within one its stored fallback begins, and the other is a part of the gap.
+        self.reach_m(self.max_lead_s()) + self.separation_m + 2.0 * self.error_m + MARGIN_M
+    }
+
+    /// Returns the same for its plans.
+    pub(super) fn plan_reach_m(&self) -> f64 {
+        self.fallback_reach_m() + self.v_m_s * self.dt_s
     }
 
     /// Returns how far from each other all see the two, in meters.
@@ -111,9 +152,9 @@ impl ShieldedAircraft {
         }
     }
 
-    /// Returns how far it can get from where it is in `dt_s` seconds and on an orbit after them, in meters.
-    fn reach_m(&self, dt_s: f64) -> f64 {
-        self.v_m_s * dt_s + 2.0 * (self.v_m_s / self.orbit_rad_s)
+    /// Returns how far it can get from where it is in some seconds and on an orbit after them, in meters.
+    fn reach_m(&self, seconds: f64) -> f64 {
+        self.v_m_s * seconds + 2.0 * (self.v_m_s / self.orbit_rad_s)
     }
 
     /// Returns two discs that it cannot leave, however it flies for `dt_s` seconds and to

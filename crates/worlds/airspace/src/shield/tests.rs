@@ -1,12 +1,31 @@
 //! The steps of the proof, as properties.
 
-use super::orbit::Orbit;
+use super::fallback::FallbackPath;
 use super::*;
-use crate::flight::{FlightLevelRange, Frame, Point, Pose2, distance_m};
+use crate::flight::{AircraftModel, FlightLevelRange, Frame, Point, Pose2, distance_m};
 use proptest::prelude::*;
+use std::sync::Arc;
 
 const DTAU_S: f64 = 1.0;
 const STEPS: usize = 5;
+/// Enough for all kinds of fallbacks.
+const MAX_LEAD_S: f64 = 60.0;
+/// Seconds after which all orbit, and then have been around several times.
+const ALL_ORBIT_S: usize = 400;
+
+fn rules(certainty: PlanCertainty) -> PlanRules {
+    PlanRules { steps: STEPS, dtau_s: DTAU_S, certainty }
+}
+
+fn choices(max_lead_s: f64) -> Arc<[Fallback]> {
+    let model = AircraftModel {
+        v_m_s: 35.0,
+        omega_max_rad_s: 4f64.to_radians(),
+        separation_m: 500.0,
+        turns: 5,
+    };
+    Fallback::choices(&model, model.omega_max_rad_s, DTAU_S * STEPS as f64, max_lead_s)
+}
 
 fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
     let pose = Pose2 { at: [x, y], heading_rad };
@@ -22,7 +41,9 @@ fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
         error_m: 0.0,
         levels: FlightLevelRange::from_level(0.0),
         vertical_m: 300.0,
-        fallback: OrbitSide::Left,
+        fallback: Fallback::default(),
+        choices: choices(MAX_LEAD_S),
+        dt_s: DTAU_S * STEPS as f64,
         exempt: ExemptIds::default(),
         rank,
     }
@@ -47,27 +68,24 @@ fn some_flyers() -> impl Strategy<Value = Vec<ShieldedAircraft>> {
 /// Airplanes with fallbacks that are apart; those that clash are left out.
 fn with_fallbacks(mut group: Vec<ShieldedAircraft>) -> Vec<ShieldedAircraft> {
     loop {
-        let (sides, clashes) = first_fallbacks(&group);
+        let (fallbacks, clashes) = first_fallbacks(&group);
         match clashes.first() {
             Some(&(i, _)) => drop(group.remove(i)),
             None => {
-                group.iter_mut().zip(sides).for_each(|(f, side)| f.fallback = side);
+                group.iter_mut().zip(fallbacks).for_each(|(f, fallback)| f.fallback = fallback);
                 return group;
             }
         }
     }
 }
 
-fn orbit_of(aircraft: &ShieldedAircraft) -> Orbit {
-    Orbit::from_pose(aircraft.pose, aircraft.v_m_s, aircraft.fallback.sign() * aircraft.orbit_rad_s)
-}
-
-fn nearest_on_orbits(group: &[ShieldedAircraft], seconds: usize) -> f64 {
-    let orbits: Vec<Orbit> = group.iter().map(orbit_of).collect();
+fn nearest_on_fallbacks(group: &[ShieldedAircraft], seconds: usize) -> f64 {
+    let paths: Vec<FallbackPath> =
+        group.iter().map(|aircraft| aircraft.fallback_path(aircraft.fallback)).collect();
     let mut nearest = f64::INFINITY;
     for t in 0..seconds * 4 {
-        for (i, a) in orbits.iter().enumerate() {
-            for b in &orbits[i + 1..] {
+        for (i, a) in paths.iter().enumerate() {
+            for b in &paths[i + 1..] {
                 let t_s = t as f64 / 4.0;
                 nearest = nearest.min(distance_m(a.at(t_s), b.at(t_s)));
             }
@@ -97,25 +115,25 @@ proptest! {
         for (k, (_, to_m)) in levels_m.iter().enumerate().take(group.len()) {
             let changing = group[k].clone();
             let from_m = changing.levels.low_m;
-            let (altitude_m, side) = next_altitude(&changing, *to_m, &group, |_| *to_m);
+            let (altitude_m, fallback) = next_altitude(&changing, *to_m, &group, |_| *to_m);
             prop_assert!((from_m.min(*to_m)..=from_m.max(*to_m)).contains(&altitude_m), "{from_m} {altitude_m} {to_m}");
-            let is_safe = |altitude_m: f64, side: OrbitSide| {
+            let is_safe = |altitude_m: f64, fallback: Fallback| {
                 let levels = FlightLevelRange::between(from_m, altitude_m);
                 let passing = ShieldedAircraft { levels, ..changing.clone() };
                 group.iter().filter(|other| passing.is_protected_from(other))
-                    .all(|other| passing.do_orbits_stay_apart(side, other, other.fallback))
+                    .all(|other| passing.do_fallbacks_stay_apart(fallback, other, other.fallback))
             };
             let left_m = to_m - altitude_m;
             if left_m.abs() > 0.05 {
                 let on_m = altitude_m + left_m.clamp(-0.05, 0.05);
-                prop_assert!(OrbitSide::BOTH.iter().all(|&side| !is_safe(on_m, side)), "{on_m} is free");
+                prop_assert!(changing.choices.iter().all(|&choice| !is_safe(on_m, choice)), "{on_m} is free");
             }
             group[k].levels = FlightLevelRange::between(from_m, altitude_m);
-            group[k].fallback = side;
+            group[k].fallback = fallback;
         }
         for (i, a) in group.iter().enumerate() {
             for b in group[..i].iter().filter(|b| a.is_protected_from(b)) {
-                prop_assert!(a.do_orbits_stay_apart(a.fallback, b, b.fallback), "{a:?} {b:?}");
+                prop_assert!(a.do_fallbacks_stay_apart(a.fallback, b, b.fallback), "{a:?} {b:?}");
             }
         }
     }
@@ -126,10 +144,10 @@ proptest! {
     #[test]
     fn first_fallbacks_stay_apart(group in some_flyers()) {
         let group = with_fallbacks(group);
-        prop_assert!(nearest_on_orbits(&group, 400) >= 500.0);
+        prop_assert!(nearest_on_fallbacks(&group, ALL_ORBIT_S) >= 500.0);
     }
 
-    /// Steps 2 to 4: for any wishes, the motions flown keep apart, and the stored orbits keep the
+    /// Steps 2 to 4: for any wishes, the motions flown keep apart, and the stored fallbacks keep the
     /// invariant. Mixable plans do in every mixture with fallbacks.
     #[test]
     fn a_filtered_step_keeps_separation_and_the_invariant(
@@ -144,17 +162,18 @@ proptest! {
             wishes.iter().map(profile).collect()
         }).collect();
         let certainty = if mixable { PlanCertainty::Mixable } else { PlanCertainty::Sure };
-        let mut decisions = filter_maneuvers(&group, &candidates, STEPS, DTAU_S, certainty);
+        let mut decisions = filter_maneuvers(&group, &candidates, rules(certainty));
         if mixable {
             for ((decision, follows), aircraft) in decisions.iter_mut().zip(follow).zip(&group) {
                 if !follows {
-                    *decision = ShieldDecision { candidate: None, fallback: aircraft.fallback };
+                    let rest = aircraft.fallback.after_cycle();
+                    *decision = ShieldDecision { candidate: None, fallback: rest };
                 }
             }
         }
         let omega = |i: usize, k: usize| match decisions[i].candidate {
             Some(c) => candidates[i][c].omegas_rad_s[k],
-            None => group[i].fallback.sign() * group[i].orbit_rad_s,
+            None => group[i].fallback.omega_rad_s(group[i].orbit_rad_s),
         };
         let mut now = group.clone();
         for k in 0..STEPS {
@@ -174,7 +193,7 @@ proptest! {
             }
         }
         now.iter_mut().zip(&decisions).for_each(|(f, d)| f.fallback = d.fallback);
-        prop_assert!(nearest_on_orbits(&now, 400) >= 500.0);
+        prop_assert!(nearest_on_fallbacks(&now, ALL_ORBIT_S) >= 500.0);
     }
 
     /// A plan that is clear of another airplane does not need its consent: however that one flies
@@ -190,7 +209,7 @@ proptest! {
         let other = ShieldedAircraft { orbit_rad_s: slow * own.omega_max_rad_s, ..aircraft(at[0], at[1], psi, 1) };
         let plan = |of: &ShieldedAircraft, parts: &[f64], left: bool| {
             let omegas_rad_s = parts.iter().map(|part| part * of.omega_max_rad_s).collect();
-            SafeManeuver::new(of.clone(), &TurnProfile { omegas_rad_s }, DTAU_S, OrbitSide::BOTH[usize::from(left)])
+            SafeManeuver::new(of.clone(), &TurnProfile { omegas_rad_s }, DTAU_S, Fallback::from_side(OrbitSide::BOTH[usize::from(left)]))
         };
         let clear = plan(&own, &[part; STEPS], own_left);
         if clear.is_clear_of(&other) {
@@ -204,7 +223,7 @@ proptest! {
         let group = [aircraft(0.0, 0.0, 0.0, 0), aircraft(x, 0.0, 3.0, 1)];
         let profile = || TurnProfile { omegas_rad_s: vec![part * group[0].orbit_rad_s; STEPS] };
         let wishes = [vec![profile()], vec![profile()]];
-        let decisions = filter_maneuvers(&group, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
+        let decisions = filter_maneuvers(&group, &wishes, rules(PlanCertainty::Sure));
         prop_assert!(decisions.iter().all(|d| d.candidate == Some(0)));
     }
 }
@@ -213,12 +232,13 @@ proptest! {
 fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
     // On its left the newcomer would orbit over the other, on its right it would not.
     let stored = aircraft(0.0, 2002.0, std::f64::consts::PI, 0);
+    let [left, right] = OrbitSide::BOTH.map(Fallback::from_side);
     let group = [stored.clone(), aircraft(0.0, 0.0, 0.0, 1)];
-    let (sides, too_close) = entry_fallbacks(&group, |i| i == 1);
-    assert_eq!((sides, too_close), (vec![OrbitSide::Left, OrbitSide::Right], vec![]));
+    let (fallbacks, too_close) = entry_fallbacks(&group, |i| i == 1);
+    assert_eq!((fallbacks, too_close), (vec![left, right], vec![]));
     let near = [stored.clone(), aircraft(100.0, 2002.0, 0.0, 1), aircraft(50.0, 2030.0, 0.0, 2)];
-    let (sides, too_close) = entry_fallbacks(&near, |i| i == 2);
-    assert_eq!(sides[..2], [OrbitSide::Left; 2]);
+    let (fallbacks, too_close) = entry_fallbacks(&near, |i| i == 2);
+    assert_eq!(fallbacks[..2], [left; 2]);
     assert_eq!(too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
 }
 
@@ -231,32 +251,33 @@ fn two_that_came_in_too_close_are_left_to_the_method_and_nobody_else_is() {
     let straight = || vec![TurnProfile { omegas_rad_s: vec![0.0; STEPS] }];
     let wishes = [straight(), straight()];
     let of_each_other = [close(0.0, 0, 1), close(100.0, 1, 0)];
-    let wanted = filter_maneuvers(&of_each_other, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
+    let wanted = filter_maneuvers(&of_each_other, &wishes, rules(PlanCertainty::Sure));
     assert!(wanted.iter().all(|d| d.candidate == Some(0)), "{wanted:?}");
     // In each other's way, and both are named with others.
     let mut of_others = [close(0.0, 0, 7), close(0.0, 1, 8)];
     let pose = Pose2 { at: [0.0, 620.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
     (of_others[1].pose, of_others[1].orbit_pose) = (pose, pose);
-    of_others.iter_mut().for_each(|f| f.fallback = OrbitSide::Right);
-    assert!(nearest_on_orbits(&of_others, 400) > 500.0);
+    of_others.iter_mut().for_each(|f| f.fallback = Fallback::from_side(OrbitSide::Right));
+    assert!(nearest_on_fallbacks(&of_others, ALL_ORBIT_S) > 500.0);
     assert!(of_others[0].is_safe_with(&of_others[1]));
-    let kept = filter_maneuvers(&of_others, &wishes, STEPS, DTAU_S, PlanCertainty::Sure);
+    let kept = filter_maneuvers(&of_others, &wishes, rules(PlanCertainty::Sure));
     assert!(kept.iter().any(|d| d.candidate.is_none()), "{kept:?}");
 }
 
 #[test]
-fn a_change_is_refused_when_neither_orbit_is_apart() {
+fn a_change_is_refused_when_no_fallback_is_apart() {
     let quick_turns = 6f64.to_radians();
     let other = ShieldedAircraft { orbit_rad_s: quick_turns, ..aircraft(1500.0, -100.0, 0.0, 0) };
-    let slow = aircraft(0.0, 0.0, 0.0, 1);
-    let beside = |changed: &ShieldedAircraft| safe_orbit_side(changed, [other.clone()].into_iter());
+    let slow = ShieldedAircraft { choices: choices(0.0), ..aircraft(0.0, 0.0, 0.0, 1) };
+    let left = Fallback::from_side(OrbitSide::Left);
+    let beside = |changed: &ShieldedAircraft| safe_fallback(changed, [other.clone()].into_iter());
     let fast = ShieldedAircraft { v_m_s: 150.0, ..slow.clone() };
-    assert_eq!((beside(&slow), beside(&fast)), (Some(OrbitSide::Left), None));
+    assert_eq!((beside(&slow), beside(&fast)), (Some(left), None));
     let above = ShieldedAircraft { levels: FlightLevelRange::from_level(1000.0), ..fast.clone() };
-    assert_eq!(beside(&above), Some(OrbitSide::Left));
+    assert_eq!(beside(&above), Some(left));
     // Named with another one, and then with this one.
     assert_eq!(beside(&ShieldedAircraft { exempt: [7].into(), ..fast.clone() }), None);
-    assert_eq!(beside(&ShieldedAircraft { exempt: [0, 7].into(), ..fast }), Some(OrbitSide::Left));
+    assert_eq!(beside(&ShieldedAircraft { exempt: [0, 7].into(), ..fast }), Some(left));
     let climbing = ShieldedAircraft { levels: FlightLevelRange::between(0.0, 1000.0), ..above };
     assert_eq!(beside(&climbing), None);
 }

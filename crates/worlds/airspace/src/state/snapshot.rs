@@ -6,7 +6,7 @@ use crate::baseline::mvp::ActiveResolutions;
 use crate::external_action::ExternalAction;
 use crate::flight::Pose2;
 use crate::pilot::AirplaneControl;
-use crate::shield::OrbitSide;
+use crate::shield::Fallback;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
 use sidestep_kernel::digest::Hasher;
@@ -22,7 +22,7 @@ pub struct AirplaneSnapshot {
     /// Number of way-points done with, overrides, orbits, and orbits in a row.
     pub counts: [u32; 4],
     /// Side of the stored fallback.
-    pub fallback: OrbitSide,
+    pub fallback: Fallback,
     /// Altitude in meters.
     pub altitude_m: f64,
     /// Number of orders carried out, and of times that one had to wait.
@@ -65,7 +65,7 @@ pub struct Snapshot {
     pub resolving: Vec<ActiveResolutions>,
     /// The pairs whose separation the shield does not guarantee now, by ids.
     pub exempt: Vec<(EntityId, EntityId)>,
-    /// Each airplane's pose on its stored orbit; empty where no gust takes it off that.
+    /// Each airplane's pose on its stored fallback; empty where no gust takes it off that.
     pub orbit_poses: Vec<Pose2>,
     /// The action that a caller has ordered for each airplane; empty unless callers decide.
     pub external_actions: Vec<Option<ExternalAction>>,
@@ -86,7 +86,7 @@ impl Snapshot {
             hash_pose(&mut hasher, &airplane.pose);
             hasher.write_u64(airplane.ended.to_bits());
             airplane.counts.iter().for_each(|&n| hasher.write_u32(n));
-            hasher.write_u8(airplane.fallback.to_bits());
+            hasher.write_u64(airplane.fallback.to_bits().into());
             // Left out without orders, because the altitude then is the scenario's, or that of the
             // track.
             let [orders, waits] = airplane.orders;

@@ -75,8 +75,8 @@ impl Pilot {
         state.phase = PilotCyclePhase::Decided;
         if !self.world.shield {
             let profile = state.candidates.profiles.first().cloned().unwrap_or_default();
-            let side = state.percept.own.fallback;
-            state.control.maneuver = Maneuver::Profile { candidate: 0, profile, side };
+            let fallback = state.percept.own.fallback;
+            state.control.maneuver = Maneuver::Profile { candidate: 0, profile, fallback };
             self.finish_cycle();
         }
     }

@@ -1,0 +1,157 @@
+//! Fallbacks of airplanes that enter, or that are about to change speed or level, and how far they may change that.
+
+use super::fallback::Fallback;
+use super::neighbors::neighbors;
+use super::shielded_aircraft::{MARGIN_M, ShieldedAircraft};
+use crate::flight::FlightLevelRange;
+
+/// Meters by which an airplane may climb or descend farther than was computed, by what is rounded. The difference of
+/// altitude that keeps levels apart is less than the scenario's by twice as much, so that levels that are apart
+/// nominally do not meet.
+const CLIMB_ROUNDING_M: f64 = 5e-7;
+
+/// Returns first fallbacks out of `choices` that are pairwise apart, as far as there are any, and the
+/// pairs that are not: they start too close.
+pub(crate) fn first_fallbacks(group: &[ShieldedAircraft]) -> (Vec<Fallback>, Vec<(usize, usize)>) {
+    entry_fallbacks(group, |_| true)
+}
+
+/// Returns the same for airplanes some of which keep the fallbacks that they have: only the
+/// airplanes in `enters` choose, and only pairs with one of them are reported.
+pub(crate) fn entry_fallbacks(
+    group: &[ShieldedAircraft],
+    enters: impl Fn(usize) -> bool,
+) -> (Vec<Fallback>, Vec<(usize, usize)>) {
+    let near = neighbors(group, ShieldedAircraft::fallback_reach_m);
+    let mut chosen: Vec<Fallback> = Vec::with_capacity(group.len());
+    for (i, aircraft) in group.iter().enumerate() {
+        chosen.push(if enters(i) { aircraft.entry_fallback() } else { aircraft.fallback });
+    }
+    let stay_apart = |(i, of_i): (usize, Fallback), (j, of_j): (usize, Fallback)| {
+        group[i].do_fallbacks_stay_apart(of_i, &group[j], of_j)
+    };
+    let count_conflicts = |chosen: &[Fallback], i: usize, fallback: Fallback| {
+        near[i].iter().filter(|&&j| !stay_apart((i, fallback), (j, chosen[j]))).count()
+    };
+    // An airplane with fewer conflicts on another fallback changes over. Conflicts only decrease, so this
+    // ends.
+    let mut has_changed = true;
+    while has_changed {
+        has_changed = false;
+        for i in (0..chosen.len()).filter(|&i| enters(i)) {
+            let present = count_conflicts(&chosen, i, chosen[i]);
+            let best = group[i]
+                .choices
+                .iter()
+                .map(|&fallback| (count_conflicts(&chosen, i, fallback), fallback))
+                .min_by_key(|(conflicts, _)| *conflicts);
+            if let Some((conflicts, fallback)) = best
+                && conflicts < present
+            {
+                chosen[i] = fallback;
+                has_changed = true;
+            }
+        }
+    }
+    let mut too_close = Vec::new();
+    for (i, others) in near.iter().enumerate() {
+        for &j in others.iter().filter(|&&j| i < j && (enters(i) || enters(j))) {
+            if !stay_apart((i, chosen[i]), (j, chosen[j])) {
+                too_close.push((i, j));
+            }
+        }
+    }
+    (chosen, too_close)
+}
+
+/// Returns the fallback out of `choices` with which an airplane that is about to fly as `changed` is apart from
+/// the stored fallbacks of others, if there is one; preferably the stored one.
+pub(crate) fn safe_fallback(
+    changed: &ShieldedAircraft,
+    others: impl Iterator<Item = ShieldedAircraft>,
+) -> Option<Fallback> {
+    let others: Vec<ShieldedAircraft> =
+        others.filter(|other| changed.is_protected_from(other)).collect();
+    stored_first(changed).find(|&fallback| {
+        others.iter().all(|other| changed.do_fallbacks_stay_apart(fallback, other, other.fallback))
+    })
+}
+
+/// Returns the stored fallback of an airplane, and then all other choices.
+fn stored_first(aircraft: &ShieldedAircraft) -> impl Iterator<Item = Fallback> {
+    let stored = aircraft.fallback;
+    [stored]
+        .into_iter()
+        .chain(aircraft.choices.iter().copied().filter(move |&choice| choice != stored))
+}
+
+/// Returns the altitude in meters, between its own and `to_m`, to which an airplane may change its level, and the
+/// fallback out of `choices` that is then apart from the stored ones of all others whose levels it meets: the one that
+/// lets it go farthest, preferably the stored one. `limit_m` is how far it may go with a fallback whatever these others
+/// do.
+///
+/// The shield keeps it apart from those whose levels it is on already, so it can always stay where it is.
+pub(crate) fn next_altitude(
+    changing: &ShieldedAircraft,
+    to_m: f64,
+    others: &[ShieldedAircraft],
+    limit_m: impl Fn(Fallback) -> f64,
+) -> (f64, Fallback) {
+    // Between two `dt` it is on one level.
+    let from_m = changing.levels.low_m;
+    // In steps of `dtau` it may come out beyond `to_m` by what is rounded.
+    let beyond_m = to_m + CLIMB_ROUNDING_M * (to_m - from_m).signum();
+    let passing = ShieldedAircraft {
+        levels: FlightLevelRange::between(from_m, beyond_m),
+        ..changing.clone()
+    };
+    let met: Vec<&ShieldedAircraft> =
+        others.iter().filter(|other| passing.is_protected_from(other)).collect();
+    // `None` where it would lose the fallback that keeps it apart from those on its own level.
+    let altitude_m = |fallback: Fallback| {
+        let mut free_m = limit_m(fallback);
+        for &other in &met {
+            let is_met_now = changing.is_protected_from(other);
+            // By the invariant; with errors of position the two need not be seen apart anew.
+            let is_kept_apart = is_met_now && fallback == changing.fallback;
+            if is_kept_apart || passing.do_fallbacks_stay_apart(fallback, other, other.fallback) {
+                continue;
+            }
+            if is_met_now {
+                return None;
+            }
+            let vertical_m = passing.vertical_m.max(other.vertical_m);
+            free_m = altitude_short_of(other.levels, vertical_m, from_m, free_m);
+        }
+        Some(free_m)
+    };
+    let mut best = (from_m, changing.fallback);
+    for fallback in stored_first(changing) {
+        if let Some(free_m) = altitude_m(fallback)
+            && (free_m - from_m).abs() > (best.0 - from_m).abs() + MARGIN_M
+        {
+            best = (free_m, fallback);
+        }
+        if best.0 == to_m {
+            break;
+        }
+    }
+    best
+}
+
+/// Returns the altitude in meters, between `from_m` and `to_m`, up to which a change of level stays off the levels of
+/// another airplane: `vertical_m` from them.
+pub(crate) fn altitude_short_of(
+    levels: FlightLevelRange,
+    vertical_m: f64,
+    from_m: f64,
+    to_m: f64,
+) -> f64 {
+    // By a margin, so that rounding never makes them meet.
+    let gap_m = vertical_m + MARGIN_M;
+    if to_m >= from_m {
+        (levels.low_m - gap_m).clamp(from_m, to_m)
+    } else {
+        (levels.high_m + gap_m).clamp(to_m, from_m)
+    }
+}
