@@ -188,9 +188,9 @@ impl AirspaceWorld {
 
     /// Returns the fallbacks that the plans of an airplane may end with.
     fn fallback_choices(&self, i: usize) -> Arc<[Fallback]> {
-        // Where messages get lost, airplanes have to know the path of one that they cannot hear: they see on which
-        // side it orbits.
-        if self.network.is_some() {
+        // Without the shield none is flown, and groups should not depend on them. Where messages get lost, airplanes have
+        // to know the path of one that they cannot hear: they see on which side it orbits.
+        if !self.shield || self.network.is_some() {
             return OrbitSide::BOTH.map(Fallback::from_side).into();
         }
         let radius_s = 1.0 / self.orbit_rad_s[i];
