@@ -164,11 +164,20 @@ impl AirspaceWorld {
 
     /// Checks that an airplane can fly a maneuver.
     fn check_maneuver(&self, percept: &Percept, maneuver: &Maneuver) -> Result<(), String> {
-        let Maneuver::Profile { candidate, profile: TurnProfile { omegas_rad_s }, .. } = maneuver
+        let Maneuver::Profile { candidate, profile: TurnProfile { omegas_rad_s }, fallback } =
+            maneuver
         else {
             return Ok(());
         };
         let own = &percept.own;
+        let cycles = fallback.cycles_until_orbit();
+        let choices = self.fallbacks[own.id as usize].iter();
+        let max_cycles = choices.map(|choice| choice.cycles_until_orbit()).max().unwrap_or(0);
+        if cycles > max_cycles {
+            return Err(format!(
+                "a fallback that orbits after {cycles} cycles; give one that does after at most {max_cycles}"
+            ));
+        }
         let steps = self.timing.points_per_dt();
         if omegas_rad_s.len() != steps {
             let found = omegas_rad_s.len();

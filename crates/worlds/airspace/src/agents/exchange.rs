@@ -504,9 +504,10 @@ impl link::ProtocolAgent for ShieldExchangeAgent {
         match message {
             ShieldExchangeMessage::Proposal(proposal) => self.setup.check_proposal(from, proposal),
             ShieldExchangeMessage::Plan(plan) => {
-                let is_possible =
-                    |plan: &Plan| (plan.profile as usize) < self.setup.aircraft[from].max_profiles;
-                InvalidMessage::Length.ensure(plan.as_ref().is_none_or(is_possible))
+                let Some(Plan { profile, fallback }) = plan else { return Ok(()) };
+                let observed = &self.setup.aircraft[from];
+                InvalidMessage::Plan.ensure(observed.aircraft.may_store(*fallback))?;
+                InvalidMessage::Length.ensure((*profile as usize) < observed.max_profiles)
             }
             ShieldExchangeMessage::Accepts(accepted) => self.setup.check_members(accepted),
         }

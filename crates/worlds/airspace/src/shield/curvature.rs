@@ -10,7 +10,8 @@
 //! ```
 //!
 //! for each of the two airplanes, with the largest separation `R_max` and the largest reach `r_max` (one `dt` of flight,
-//! the longest way until an orbit begins, and the diameter of an orbit) of all airplanes, and the smallest radius of curvature of the ellipsoid: farther apart
+//! the longest way until an orbit begins, and the diameter of an orbit) of all airplanes, and the smallest radius of
+//! curvature of the ellipsoid: farther apart
 //! than `R_max + 2 r_max` no two are compared. New plans keep `2 e` more than the separation, as for errors of position
 //! (`errors.rs`). Sampled pairs are off by less than half of that (a test), so that what is flown on the earth, and what
 //! is measured in the planes of later steps, both keep the separation.

@@ -79,9 +79,18 @@ impl ShieldedAircraft {
     /// Returns the fallback with which it enters: the stored one, unless that takes longer until it orbits than all that
     /// it may choose, because other rules held when it was stored.
     pub(super) fn entry_fallback(&self) -> Fallback {
-        let longest = self.choices.iter().map(|choice| choice.cycles_until_orbit()).max();
-        let is_within = Some(self.fallback.cycles_until_orbit()) <= longest;
-        if is_within { self.fallback } else { Fallback::from_side(self.fallback.orbit_side) }
+        if self.may_store(self.fallback) {
+            self.fallback
+        } else {
+            Fallback::from_side(self.fallback.orbit_side)
+        }
+    }
+
+    /// Returns whether a fallback takes no longer until it orbits than those that it may choose: others are sure to be
+    /// out of its reach only then.
+    pub(crate) fn may_store(&self, fallback: Fallback) -> bool {
+        let cycles = fallback.cycles_until_orbit();
+        self.choices.iter().any(|choice| cycles <= choice.cycles_until_orbit())
     }
 
     /// Returns the path of a fallback that it holds, or that it enters where it is, in its frame.

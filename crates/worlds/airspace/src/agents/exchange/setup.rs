@@ -83,6 +83,7 @@ impl ShieldExchangeSetup {
         InvalidMessage::Number.ensure(is_valid_pose)?;
         let are_known = exempt.iter().all(|&id| (id as usize) < self.airplanes);
         InvalidMessage::Airplane.ensure(are_known && is_ascending(exempt))?;
+        InvalidMessage::Plan.ensure(observed.aircraft.may_store(proposal.fallback))?;
         InvalidMessage::Length.ensure(profiles.len() <= self.aircraft[place].max_profiles)?;
         profiles.iter().try_for_each(|profile| self.check_profile(place, profile))
     }

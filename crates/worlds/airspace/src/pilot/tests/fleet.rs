@@ -201,12 +201,21 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
         profile: crate::shield::TurnProfile { omegas_rad_s },
         fallback: crate::shield::Fallback::default(),
     };
-    let wrong: [(Vec<AirplaneControl>, &str); 7] = [
+    let falls_back_far_away = Maneuver::Profile {
+        candidate: 0,
+        profile: crate::shield::TurnProfile { omegas_rad_s: vec![0.0; 5] },
+        fallback: crate::shield::Fallback::after_straight(100, crate::shield::OrbitSide::Left),
+    };
+    let wrong: [(Vec<AirplaneControl>, &str); 8] = [
         (changed(&|control| control.id = 9), "it does not decide in this cycle"),
         (changed(&|control| control.cycle = 3), "give that of airplane 1 and cycle 0"),
         (changed(&|control| control.maneuver = profile(vec![0.0; 4])), "give 5, one for each step"),
         (changed(&|control| control.maneuver = profile(vec![f64::NAN; 5])), "a turn rate of NaN"),
         (changed(&|control| control.maneuver = profile(vec![9.0; 5])), "a turn rate of 9"),
+        (
+            changed(&|control| control.maneuver = falls_back_far_away.clone()),
+            "orbits after 100 cycles; give one that does after at most 0",
+        ),
         (
             changed(&|control| control.maneuver = profile(vec![0.001; 5])),
             "those of none of its actions",
