@@ -147,7 +147,8 @@ impl SafeManeuver {
     /// Returns whether two plans stay apart during `dt` and on the fallbacks forever after it.
     pub(crate) fn is_compatible(&self, other: &Self) -> bool {
         let lead_s = [self, other].map(|plan| plan.path.lead_s());
-        let (own, others) = (self.aircraft(), other.aircraft());
+        let own = self.aircraft();
+        let others = other.aircraft();
         if !own.is_protected_from(others) || !own.can_come_too_near(others, lead_s) {
             return true;
         }
