@@ -125,8 +125,8 @@ metrics! {
         pub optimize_cpu_s: f64 => "time spent deciding",
         /// Times that the shield changed a wish.
         pub shield_overrides: u64 => "wishes changed by the shield",
-        /// Wishes changed by the shield for an orbit, for one `dt`.
-        pub shield_orbits: u64 => "falls back",
+        /// Wishes changed by the shield for the stored fallback, for one `dt`.
+        pub shield_orbits: u64 => "times on the stored fallback",
         /// Wishes changed because not all others had agreed in time.
         pub shield_held_back: u64 => "wishes held back for lack of agreement",
         /// Times that an airplane lost contact with another one.

@@ -38,10 +38,14 @@ fn delay_percent(name: &str, text: &str, shield: &str, method: &str) -> f64 {
     delay
 }
 
-/// The bar: one and a half times the delay without the shield, and one percent.
+/// The bar on delays in percent: one and a quarter times that without the shield, and half a percent.
+fn is_little(off: f64, on: f64) -> bool {
+    on <= 1.25 * off + 0.5
+}
+
 fn costs_little(name: &str, text: &str, method: &str) {
     let [off, on] = ["off", "on"].map(|shield| delay_percent(name, text, shield, method));
-    assert!(on <= 1.5 * off + 1.0, "{name}, {method}: {on} % with the shield, {off} % without");
+    assert!(is_little(off, on), "{name}, {method}: {on} % with the shield, {off} % without");
 }
 
 /// Random traffic of airplanes that each have a speed and a turn rate of their own, up to five times
@@ -86,6 +90,22 @@ fn the_shield_costs_little_where_turn_rates_differ() {
     }
 }
 
+/// Speeds of 25 to 50 m/s and turn rates of 2 to 10 deg/s, by methods that do not know of the shield.
+#[test]
+fn the_shield_costs_every_method_little() {
+    for method in ["pc", "mvp", "orca"] {
+        let seeds: Vec<u64> = (1..25).collect();
+        let mean = |shield: &str| {
+            let one = |seed| delay_percent("mixed", &mixed(14, seed, 2.0), shield, method);
+            seeds.iter().copied().map(one).sum::<f64>() / seeds.len() as f64
+        };
+        let off = mean("off");
+        let on = mean("on");
+        println!("MEAN {method}: {off:.2} {on:.2}");
+        assert!(is_little(off, on), "{method}: {on} % with the shield, {off} % without");
+    }
+}
+
 #[test]
 fn the_shield_costs_recorded_traffic_little() {
     let path = "airspace/opensky/switzerland_20180801_dev.csv";
@@ -106,7 +126,7 @@ fn the_shield_costs_random_traffic_little_on_average() {
         };
         let (off, on) = (mean("off"), mean("on"));
         println!("MEAN {n} of {slowest_deg_s} to {} deg/s: {off:.2} {on:.2}", 5.0 * slowest_deg_s);
-        assert!(on <= 1.5 * off + 1.0, "{on} {off}");
+        assert!(is_little(off, on), "{on} {off}");
     }
 }
 
@@ -126,6 +146,10 @@ fn the_shield_costs_traffic_of_bluesky_files_little() {
         let Some(text) = from_bluesky(&name, &scn).filter(|_| (2..60).contains(&count)) else {
             continue;
         };
+        // On the earth no shield is proved in a wind.
+        if text.contains("wind_m_s") {
+            continue;
+        }
         let flown = ["off", "on"].map(|shield| flown(&name, &text, shield, "pc"));
         if let [Some(off), Some(on)] = flown.map(|metrics| metrics.mean_delay_percent) {
             println!("BLUESKY {name} {count} {off:.2} {on:.2}");
