@@ -6,8 +6,8 @@
 //! cost 1. Countries learn only from the cost of their own color.
 
 use sidestep_collectives::{
-    Choice, Estimator, Game, OptimizerConfig, PairwiseGame, StopCriterion, Update, UpdateOrder,
-    Utility, optimize,
+    Choice, Estimator, Game, LocalSearch, OptimizerConfig, PairwiseGame, StopCriterion, Update,
+    UpdateOrder, Utility, optimize,
 };
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -37,6 +37,8 @@ fn main() {
         cooling: 0.95,
         stop: StopCriterion { threshold: 1e-3, calm_rounds: 3, max_rounds: 500 },
         choice: Choice::Argmax,
+        local_search: LocalSearch::None,
+        random_starts: 0,
     };
     let streams = Streams::new(Seed(1));
     let result = optimize(&game, &config, |country, k| {

@@ -27,20 +27,20 @@ pub trait Game {
 #[derive(Debug, Clone, Default)]
 pub struct PairwiseGame {
     strategies: Vec<usize>,
-    own: Vec<Vec<f64>>,
-    pairs: Vec<PairCosts>,
+    pub(super) own: Vec<Vec<f64>>,
+    pub(super) pairs: Vec<PairCosts>,
     /// Indices of each player's pairs.
-    player_pairs: Vec<Vec<usize>>,
+    pub(super) player_pairs: Vec<Vec<usize>>,
 }
 
 /// The costs of the joint strategies of two players. They are stored with a row per strategy of either player, because
 /// expectations read whole rows.
 #[derive(Debug, Clone)]
-struct PairCosts {
-    a: usize,
-    b: usize,
+pub(super) struct PairCosts {
+    pub(super) a: usize,
+    pub(super) b: usize,
     /// The joint cost of two strategies: a row per strategy of `a`.
-    given_a: CostTable,
+    pub(super) given_a: CostTable,
     /// The same with a row per strategy of `b`.
     given_b: CostTable,
     /// The same divided into the parts of `a` and of `b`: `parts[x_a * strategies_b + x_b]`.
@@ -49,11 +49,25 @@ struct PairCosts {
 
 /// The costs of one player's strategies, a row per strategy of another.
 #[derive(Debug, Clone)]
-struct CostTable {
+pub(super) struct CostTable {
     width: usize,
     costs: Vec<f64>,
     /// Rows with any cost that is not 0, in increasing order: most strategies of two airplanes do not conflict.
-    nonzero_rows: Vec<usize>,
+    pub(super) nonzero_rows: Vec<usize>,
+    /// The lowest cost of all.
+    pub(super) min: f64,
+}
+
+impl PairCosts {
+    /// Returns the player of the pair that a player is not.
+    pub(super) fn other(&self, player: usize) -> usize {
+        self.a + self.b - player
+    }
+
+    /// Returns the costs with a row per strategy of a player.
+    pub(super) fn given(&self, player: usize) -> &CostTable {
+        if player == self.a { &self.given_a } else { &self.given_b }
+    }
 }
 
 impl CostTable {
@@ -61,10 +75,11 @@ impl CostTable {
         let rows = costs.chunks_exact(width).enumerate();
         let nonzero = rows.filter(|(_, costs)| costs.iter().any(|cost| *cost != 0.0));
         let nonzero_rows = nonzero.map(|(row, _)| row).collect();
-        Self { width, costs, nonzero_rows }
+        let min = costs.iter().copied().fold(f64::INFINITY, f64::min);
+        Self { width, costs, nonzero_rows, min }
     }
 
-    fn row(&self, row: usize) -> &[f64] {
+    pub(super) fn row(&self, row: usize) -> &[f64] {
         &self.costs[row * self.width..][..self.width]
     }
 
@@ -137,8 +152,7 @@ impl PairwiseGame {
     fn index_pair(&mut self, player: usize, other: usize, index: usize) {
         let pairs = &self.pairs;
         let player_pairs = &mut self.player_pairs[player];
-        // The sum of a pair's players less this player is the other one.
-        let slot = player_pairs.partition_point(|&k| pairs[k].a + pairs[k].b - player < other);
+        let slot = player_pairs.partition_point(|&k| pairs[k].other(player) < other);
         player_pairs.insert(slot, index);
     }
 
@@ -159,12 +173,9 @@ impl PairwiseGame {
         expected.clear();
         expected.extend_from_slice(&self.own[player]);
         for &index in &self.player_pairs[player] {
-            let PairCosts { a, b, given_a, given_b, .. } = &self.pairs[index];
-            if *a == player {
-                given_b.add_expected_costs(&q[*b], expected);
-            } else {
-                given_a.add_expected_costs(&q[*a], expected);
-            }
+            let pair = &self.pairs[index];
+            let other = pair.other(player);
+            pair.given(other).add_expected_costs(&q[other], expected);
         }
     }
 

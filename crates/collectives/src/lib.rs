@@ -2,10 +2,16 @@
 #![doc = include_str!("../README.md")]
 
 mod game;
+mod local_search;
+mod minimum;
 mod optimize;
 mod player;
 
 pub use game::{Game, PairwiseGame};
+pub use local_search::{
+    Descents, LocalSearch, PairMove, PlayerCosts, is_at_bound, start_strategies,
+};
+pub use minimum::{Minimum, find_minimum};
 pub use optimize::{
     Estimator, OptimizeResult, OptimizerConfig, StopCriterion, UpdateOrder, optimize,
 };

@@ -1,6 +1,7 @@
 //! The rounds: estimate, update, cool, until the distributions have converged.
 
-use super::game::Game;
+use super::game::{Game, PairwiseGame};
+use super::local_search::{LocalSearch, is_at_bound, run_descents, start_strategies};
 use super::player::{Choice, Player, Update, Utility};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -76,6 +77,20 @@ pub struct OptimizerConfig {
     pub stop: StopCriterion,
     /// The choice of final strategies from the distributions.
     pub choice: Choice,
+    /// What follows the rounds.
+    pub local_search: LocalSearch,
+    /// The number of random starts of the local search, besides the choice from the distributions and the joint move in
+    /// which each player has the strategy that is cheapest for it alone.
+    pub random_starts: u32,
+}
+
+impl OptimizerConfig {
+    /// Returns the numbers of the uniform draws for the random starts, when the rounds have taken `drawn`.
+    pub fn start_draws(&self, drawn: u64) -> std::ops::Range<u64> {
+        // The first one is for the final choice.
+        let first = drawn + 1;
+        first..first + u64::from(self.random_starts)
+    }
 }
 
 /// An optimization stops after enough calm rounds in a row, or else at the maximum.
@@ -105,8 +120,12 @@ pub struct OptimizeResult {
     /// The final distributions.
     pub q: Vec<Vec<f64>>,
     /// Each player's final estimate of `E[G | x]`, up to a constant: it ranks the strategies that
-    /// were not chosen.
+    /// were not chosen. After a local search it is the cost beside the chosen strategies of the others.
     pub expected: Vec<Vec<f64>>,
+    /// The cost of the chosen joint move.
+    pub cost: f64,
+    /// A lower bound on the cost of every joint move, where the game is a sum over pairs.
+    pub bound: Option<f64>,
     /// Number of rounds that were run, at most `max_rounds`.
     pub rounds: u32,
     /// Whether the distributions converged, rather than the rounds run out.
@@ -117,7 +136,7 @@ pub struct OptimizeResult {
 /// stream: samples use them in order, and the one after the last is for the final draw.
 ///
 /// # Panics
-/// When the estimator is exact and the game is not a sum over pairs.
+/// When the estimator is exact, or a local search is to follow, and the game is not a sum over pairs.
 pub fn optimize(
     game: &impl Game,
     config: &OptimizerConfig,
@@ -134,13 +153,14 @@ pub fn optimize(
         calm = config.stop.count_calm_rounds(calm, change);
         rounds += 1;
     }
-    OptimizeResult {
-        joint: optimizer.final_joint(),
-        expected: optimizer.players.iter().map(|p| p.expected().to_vec()).collect(),
-        q: optimizer.players.into_iter().map(|p| p.q).collect(),
-        rounds,
-        converged: calm >= config.stop.calm_rounds,
-    }
+    let rounds_end = RoundsEnd { rounds, converged: calm >= config.stop.calm_rounds };
+    optimizer.finish(rounds_end)
+}
+
+/// How the rounds have ended.
+struct RoundsEnd {
+    rounds: u32,
+    converged: bool,
 }
 
 /// All players and their samples during an optimization.
@@ -220,6 +240,28 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> OptimizerState<'g, G, U> {
         }
     }
 
+    /// Chooses strategies from the distributions, and improves them by local search where that is asked for.
+    fn finish(self, end: RoundsEnd) -> OptimizeResult {
+        let joint = self.final_joint();
+        let cost = self.game.cost(&joint);
+        let bound = self.game.as_pairwise().map(PairwiseGame::lower_bound);
+        let mut result = OptimizeResult {
+            joint,
+            expected: self.players.iter().map(|p| p.expected().to_vec()).collect(),
+            cost,
+            bound,
+            q: Vec::new(),
+            rounds: end.rounds,
+            converged: end.converged,
+        };
+        let is_minimum = bound.is_some_and(|bound| is_at_bound(cost, bound));
+        if self.config.local_search == LocalSearch::Pairs && !is_minimum {
+            self.search_locally(&mut result);
+        }
+        result.q = self.players.into_iter().map(|p| p.q).collect();
+        result
+    }
+
     fn final_joint(&self) -> Vec<usize> {
         let mut joint = Vec::with_capacity(self.players.len());
         for (i, player) in self.players.iter().enumerate() {
@@ -227,11 +269,29 @@ impl<'g, G: Game, U: Fn(usize, u64) -> f64> OptimizerState<'g, G, U> {
         }
         joint
     }
+
+    /// Replaces the joint move by the cheapest end of a local search.
+    fn search_locally(&self, result: &mut OptimizeResult) {
+        let game = self.game.as_pairwise().expect("a local search needs a sum over pairs");
+        let mut starts = Vec::with_capacity(self.players.len());
+        for (i, &chosen) in result.joint.iter().enumerate() {
+            let draws = self.config.start_draws(self.drawn).map(|k| (self.uniform)(i, k));
+            starts.push(start_strategies(game, i, chosen, draws));
+        }
+        let descents = run_descents(game, &starts);
+        result.joint = descents.best_joint().to_vec();
+        result.cost = descents.best_cost();
+        for (i, expected) in result.expected.iter_mut().enumerate() {
+            expected.clear();
+            expected.extend_from_slice(descents.best_costs_given(i));
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::game::tests::{game, joints};
+    use super::super::minimum::find_minimum;
     use super::*;
     use sidestep_kernel::Seed;
     use sidestep_kernel::math;
@@ -245,6 +305,8 @@ mod tests {
         cooling: 0.8,
         stop: StopCriterion { threshold: 1e-3, calm_rounds: 3, max_rounds: 200 },
         choice: Choice::Argmax,
+        local_search: LocalSearch::None,
+        random_starts: 0,
     };
 
     fn uniform(seed: u64) -> impl Fn(usize, u64) -> f64 {
@@ -293,6 +355,23 @@ mod tests {
                 assert!(apart != 1 || game.cost(&joint) >= found - 1e-9, "salt {salt}");
             }
         }
+    }
+
+    #[test]
+    fn a_local_search_finds_most_minima_of_random_games_and_tells_a_bound() {
+        let mut found = 0;
+        for salt in 0..100 {
+            let costs: Vec<f64> = (0..400).map(|k| uniform(salt)(1, k)).collect();
+            let game = game(&[5, 6, 4, 5, 6], &costs);
+            let config =
+                OptimizerConfig { local_search: LocalSearch::Pairs, random_starts: 8, ..EXACT };
+            let outcome = optimize(&game, &config, uniform(salt));
+            let least = find_minimum(&game, &outcome.joint, u64::MAX).expect("no limit").cost;
+            assert!(outcome.bound.is_some_and(|bound| bound <= least + 1e-9), "salt {salt}");
+            assert_eq!(outcome.cost, game.cost(&outcome.joint), "salt {salt}");
+            found += usize::from(outcome.cost <= least + 1e-9);
+        }
+        assert!(found >= 95, "{found} of 100");
     }
 
     #[test]

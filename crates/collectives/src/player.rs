@@ -49,6 +49,37 @@ pub enum Choice {
     Draw,
 }
 
+impl Choice {
+    /// Returns the final strategy of a player with the distribution `q`; `u` as in [`Player::sample`].
+    pub fn choose(self, q: &[f64], u: f64) -> usize {
+        match self {
+            Self::Draw => sample(q, u),
+            Self::Argmax => {
+                let mut best = 0;
+                for x in 1..q.len() {
+                    if q[x] > q[best] {
+                        best = x;
+                    }
+                }
+                best
+            }
+        }
+    }
+}
+
+/// Returns the strategy that the uniform number `u` in [0, 1) selects under `q`.
+fn sample(q: &[f64], u: f64) -> usize {
+    let mut cumulative = 0.0;
+    for (x, p) in q.iter().enumerate() {
+        cumulative += p;
+        if u < cumulative {
+            return x;
+        }
+    }
+    // Rounding may leave the sum of all probabilities just below `u`.
+    q.len() - 1
+}
+
 /// A player of a game: all that it keeps from round to round.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Player {
@@ -93,31 +124,12 @@ impl Player {
 
     /// Returns the strategy that the uniform number `u` in [0, 1) selects under `q`.
     pub fn sample(&self, u: f64) -> usize {
-        let mut cumulative = 0.0;
-        for (x, p) in self.q.iter().enumerate() {
-            cumulative += p;
-            if u < cumulative {
-                return x;
-            }
-        }
-        // Rounding may leave the sum of all probabilities just below `u`.
-        self.q.len() - 1
+        sample(&self.q, u)
     }
 
     /// Returns the final strategy; `u` as in [`Player::sample`].
     pub fn choose(&self, choice: Choice, u: f64) -> usize {
-        match choice {
-            Choice::Draw => self.sample(u),
-            Choice::Argmax => {
-                let mut best = 0;
-                for x in 1..self.q.len() {
-                    if self.q[x] > self.q[best] {
-                        best = x;
-                    }
-                }
-                best
-            }
-        }
+        choice.choose(&self.q, u)
     }
 
     /// Updates the estimates from a block of samples: strategies and the cost of each. Estimates of

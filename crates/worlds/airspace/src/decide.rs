@@ -6,8 +6,8 @@ mod local_flight;
 mod preferences;
 mod velocity;
 
-use super::agents::ActionChoice;
 use super::agents::network_traffic::NetworkTraffic;
+use super::agents::{ActionChoice, ReachedCost};
 use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{Action, KnownAircraft};
@@ -21,11 +21,11 @@ use super::world::AirspaceWorld;
 pub(super) use group_memory::max_group_memory_bytes;
 use preferences::rank_straight_first;
 use serde::{Deserialize, Serialize};
-use sidestep_collectives::optimize;
+use sidestep_collectives::{Game, find_minimum, is_at_bound, optimize};
 use sidestep_kernel::{Cycle, EntityId};
 
 /// One optimization: of a group, in a cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OptimizationRecord {
     /// Cycle for which the actions were chosen.
     pub cycle: Cycle,
@@ -37,6 +37,10 @@ pub struct OptimizationRecord {
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
+    /// The cost of the chosen joint action, with a lower bound; none from agents that sample.
+    pub reached: Option<ReachedCost>,
+    /// The true minimum, in groups so small that the scenario asks for it.
+    pub minimum: Option<f64>,
     /// Messages and bytes on the network.
     pub traffic: NetworkTraffic,
 }
@@ -50,6 +54,11 @@ pub struct OptimizationStats {
     pub rounds: u64,
     /// Number of those that ended before they had converged.
     pub unconverged: u64,
+    /// Number of those whose cost is at its lower bound, so that it is the minimum.
+    pub proved_minima: u64,
+    /// Number of those of which the true minimum was computed, and of those that have reached it.
+    pub known_minima: u64,
+    pub reached_minima: u64,
     /// Messages on the network, including the shield's exchanges.
     pub traffic: NetworkTraffic,
     /// Beacons on the network, by which airplanes have found their groups.
@@ -62,6 +71,12 @@ impl OptimizationStats {
         self.optimizations += 1;
         self.rounds += u64::from(one.rounds);
         self.unconverged += u64::from(!one.converged);
+        let is_proved = one.reached.is_some_and(|reached| reached.is_proved_minimum());
+        self.proved_minima += u64::from(is_proved);
+        if let (Some(minimum), Some(reached)) = (one.minimum, one.reached) {
+            self.known_minima += 1;
+            self.reached_minima += u64::from(is_at_bound(reached.cost, minimum));
+        }
         self.traffic.add(one.traffic);
     }
 }
@@ -199,6 +214,33 @@ pub(super) fn decide_centrally(
     decide_by_predictions(world, &ids, &options, now).into_iter().map(Some).collect()
 }
 
+/// Largest number of partial joint actions that the search for a true minimum looks at: about 50 ms.
+const MAX_MINIMUM_NODES: u64 = 100_000;
+
+/// The objective of a joint action of a group, and its true minimum.
+pub(super) struct JointActionCost {
+    pub(super) reached: ReachedCost,
+    /// None if the search for it takes too long.
+    pub(super) minimum: Option<f64>,
+}
+
+/// Returns the cost of the joint action that a group has chosen, as one who knows all computes it.
+pub(super) fn joint_action_cost(
+    world: &AirspaceWorld,
+    group: &[KnownAircraft],
+    non_cooperative: &[NonCooperativeAircraft],
+    joint: &[usize],
+) -> JointActionCost {
+    let options: Vec<ActionPredictions> =
+        group.iter().map(|known| world.action_predictions(*known, non_cooperative)).collect();
+    let game = build_group_game(&world.objective, &options);
+    let minimum = find_minimum(&game, joint, MAX_MINIMUM_NODES).map(|minimum| minimum.cost);
+    JointActionCost {
+        reached: ReachedCost { cost: game.cost(joint), bound: game.lower_bound() },
+        minimum,
+    }
+}
+
 /// Decides for all airplanes of a group, by the predictions of their actions.
 pub(super) fn decide_by_predictions(
     world: &AirspaceWorld,
@@ -210,12 +252,14 @@ pub(super) fn decide_by_predictions(
     let outcome = optimize(&game, &world.settings, |player: usize, k: u64| {
         purpose::sample(&world.streams, ids[player], now, k)
     });
+    let reached = ReachedCost::from_result(&outcome);
     let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
     each.map(|((chosen, expected), chances)| ActionChoice {
         chosen,
         expected,
         rounds: outcome.rounds,
         converged: outcome.converged,
+        reached,
         chances,
     })
     .collect()

@@ -120,6 +120,12 @@ metrics! {
         pub rounds_mean: Option<f64> => "mean rounds of an optimization",
         /// Optimizations whose rounds ran out.
         pub unconverged: u64 => "optimizations without convergence",
+        /// Optimizations whose cost is at its lower bound, so that no joint action costs less.
+        pub proved_minima: u64 => "optimizations proved to be a minimum",
+        /// Optimizations of which the true minimum was computed, in groups of up to `minimum_up_to` airplanes.
+        pub known_minima: u64 => "optimizations with a known minimum",
+        /// Those of them that have reached it.
+        pub reached_minima: u64 => "known minima reached",
         /// Processor time spent deciding, all workers together; measured, so it differs from run to run. In seconds, of the
         /// run of this process.
         pub optimize_cpu_s: f64 => "time spent deciding",
@@ -354,8 +360,16 @@ pub(crate) fn metrics(
     let all = (0..world.airplanes.len() as EntityId).map(|id| airplane_metrics(world, state, id));
     let all: Vec<AirplaneMetrics> = all.collect();
     let delays: Vec<f64> = all.iter().filter_map(|a| a.delay_percent).collect();
-    let OptimizationStats { optimizations, rounds, unconverged, traffic, beacons } =
-        counters.effort;
+    let OptimizationStats {
+        optimizations,
+        rounds,
+        unconverged,
+        proved_minima,
+        known_minima,
+        reached_minima,
+        traffic,
+        beacons,
+    } = counters.effort;
     let [losses_of_reported_pairs, losses_of_unreported_pairs] = losses_by_report(counters);
     let losses_in = |phase| losses_in_phase(world, counters, phase);
     let delay_in = |phase| delay_in_phase(world, &all, phase);
@@ -391,6 +405,9 @@ pub(crate) fn metrics(
         optimizations,
         rounds_mean: mean(rounds as f64, optimizations as usize),
         unconverged,
+        proved_minima,
+        known_minima,
+        reached_minima,
         optimize_cpu_s: decide_s,
         shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
         shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),

@@ -132,6 +132,13 @@ fn optimizations_table() -> Table<OptimizationRecord> {
         .label("converged", "whether the distributions had settled", ["no", "yes"], |o| {
             u32::from(o.converged)
         })
+        .f64("cost", "objective G of the joint action chosen; none from agents that sample", |o| {
+            o.reached.map(|reached| reached.cost)
+        })
+        .f64("bound", "lower bound on G of every joint action", |o| {
+            o.reached.map(|reached| reached.bound)
+        })
+        .f64("minimum", "true minimum of G, in groups of up to minimum_up_to", |o| o.minimum)
         .u64("messages", "messages, one per receiver", |o| o.traffic.messages)
         .u64("bytes", "their bytes", |o| o.traffic.bytes)
 }

@@ -28,12 +28,13 @@ use rule_changes::RuleChangeSection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use sidestep_collectives::{Choice, Estimator, Update, UpdateOrder, Utility};
+use sidestep_collectives::{Choice, Estimator, LocalSearch, Update, UpdateOrder, Utility};
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{
-    ByName, Closed, Head, Number, Point, Rule, Sections, SeedEffect, Source, Spanned, schema,
+    ByName, Closed, Head, Integer, Number, Point, Rule, Sections, SeedEffect, Source, Spanned,
+    schema,
 };
 use std::sync::Arc;
 
@@ -100,6 +101,11 @@ struct AirspaceSection {
     cooling: Option<Number<Cooling>>,
     max_rounds: Option<RoundCount>,
     choice: Option<Choice>,
+    local_search: Option<Spanned<LocalSearch>>,
+    /// Number of random starts of the local search.
+    random_starts: Option<Spanned<Integer<0, 100>>>,
+    /// Groups of up to this many airplanes are told the true minimum of the objective.
+    minimum_up_to: Option<Integer<0, 8>>,
     vertical_m: Option<Number<LevelGap>>,
     replay_until_s: Option<Number<ReplayUntilRange>>,
     group_memory_gib: Option<Number<Gibibytes>>,

@@ -347,6 +347,7 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
         format!("{d:.1} % on average{}{}", phase_delays_text(m), in_flight_text(m.in_flight))
     });
     let rounds = m.rounds_mean.map_or(String::new(), |r| format!(", {r:.1} rounds each"));
+    let minima = minima_text(m);
     vec![
         key_value_pair(
             "arrived",
@@ -355,7 +356,10 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
         key_value_pair("nearest approach", nearest),
         key_value_pair("losses of separation", lost),
         key_value_pair("delay", delay),
-        key_value_pair("optimizations", format!("{}{rounds}", group_thousands(m.optimizations))),
+        key_value_pair(
+            "optimizations",
+            format!("{}{rounds}{minima}", group_thousands(m.optimizations)),
+        ),
         key_value_pair(
             "shield",
             format!(
@@ -365,6 +369,18 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
             ),
         ),
     ]
+}
+
+/// Returns how many optimizations have found a minimum, as far as that is known.
+fn minima_text(m: &Metrics) -> String {
+    match (m.known_minima, m.proved_minima) {
+        (0, 0) => String::new(),
+        (0, proved) => format!(", {} of them proved to be a minimum", group_thousands(proved)),
+        (known, _) => {
+            let reached = group_thousands(m.reached_minima);
+            format!(", {reached} of {} known minima reached", group_thousands(known))
+        }
+    }
 }
 
 /// Returns how many losses are in which phase of recorded flights, if any are known.

@@ -23,6 +23,8 @@ pub(crate) struct InspectionTrace {
     pub(crate) non_cooperative: Vec<NonCooperativeAircraft>,
     /// Its knowledge of others before.
     pub(crate) contacts: TrafficPicture,
+    /// The actions that the optimizer has chosen for all of the group, if they are known.
+    pub(crate) joint: Option<Vec<usize>>,
     /// The optimizer's decision for it.
     pub(crate) choice: Option<ActionChoice>,
     /// Messages of the group's optimization.
@@ -64,6 +66,8 @@ impl InspectionTrace {
         let Some(me) = self.place_in_group(own.iter().map(|own| own.id)) else { return };
         self.group = own.iter().map(OwnshipState::as_known_aircraft).collect();
         self.non_cooperative = non_cooperative.to_vec();
+        self.joint =
+            considered.iter().map(|one| one.decided.as_ref().map(|choice| choice.chosen)).collect();
         let candidates = considered[me].clone();
         self.actions = candidates.actions;
         self.profiles = candidates.profiles;

@@ -51,6 +51,8 @@ pub struct AirspaceWorld {
     pub groups: Grouping,
     /// The network that carries its messages, if it is unreliable.
     pub network: Option<Network>,
+    /// Optimizations of groups of up to this many airplanes are compared with the true minimum.
+    pub minimum_up_to: usize,
     /// Bytes that the pair tables of a group may take; larger groups are not optimized.
     pub group_bytes: u64,
     /// Whether the shield filters decisions.

@@ -2,8 +2,9 @@
 
 use super::protect::{exempt_non_cooperative, store_maneuver};
 use crate::agents::network_traffic::NetworkTraffic;
-use crate::decide::OptimizationRecord;
+use crate::decide::{OptimizationRecord, joint_action_cost};
 use crate::events::{Event, EventKind};
+use crate::flight::KnownAircraft;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OptimizationStatus, OwnshipState};
 use crate::scratch::PhaseContext;
@@ -27,7 +28,7 @@ pub(super) fn apply_controls(
     mut controls: Vec<Option<AirplaneControl>>,
 ) -> Vec<FlownProfile> {
     let PhaseContext { world, state, .. } = *context;
-    record_outcomes(context, own, &controls);
+    record_outcomes(context, own, non_cooperative, &controls);
     if world.shield && world.network.is_none() && controls.iter().any(Option::is_none) {
         // Plans that are sure are safe only if all fly them, and orbits always are.
         for control in controls.iter_mut().flatten() {
@@ -63,9 +64,10 @@ pub(super) fn apply_controls(
 fn record_outcomes(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
+    non_cooperative: &[NonCooperativeAircraft],
     controls: &[Option<AirplaneControl>],
 ) {
-    let now = context.now;
+    let PhaseContext { world, now, .. } = *context;
     let scratch = &mut *context.scratch;
     for (own, control) in own.iter().zip(controls) {
         match control {
@@ -90,6 +92,17 @@ fn record_outcomes(
         scratch.exchanged.add(deciding);
         return;
     }
+    let mut reached = optimized.iter().find_map(|one| one.reached);
+    let mut minimum = None;
+    let are_all_decided =
+        optimized.len() == own.len() && optimized.iter().all(|one| one.is_decided);
+    if are_all_decided && own.len() <= world.minimum_up_to {
+        let group: Vec<KnownAircraft> = own.iter().map(OwnshipState::as_known_aircraft).collect();
+        let joint: Vec<usize> = optimized.iter().map(|one| one.chosen as usize).collect();
+        let cost = joint_action_cost(world, &group, non_cooperative, &joint);
+        reached = Some(cost.reached);
+        minimum = cost.minimum;
+    }
     let ids = own.iter().map(|own| own.id);
     scratch.optimizations.push(OptimizationRecord {
         cycle: now,
@@ -98,6 +111,8 @@ fn record_outcomes(
         rounds: optimized.iter().find(|one| one.is_decided).map_or(0, |one| one.rounds),
         converged: optimized.iter().any(|one| one.is_decided)
             && optimized.iter().all(|one| one.converged || !one.is_decided),
+        reached,
+        minimum,
         traffic: deciding,
     });
 }

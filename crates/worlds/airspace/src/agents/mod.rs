@@ -42,6 +42,7 @@ pub use participant::{
     Participant,
 };
 use serde::{Deserialize, Serialize};
+use sidestep_collectives::{OptimizeResult, is_at_bound};
 use traffic_state::StateBeacon;
 
 /// Outcome of the optimization for an airplane.
@@ -55,10 +56,33 @@ pub struct ActionChoice {
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
+    /// The cost of the joint action, where it is known: agents that sample never add it up.
+    pub reached: Option<ReachedCost>,
     /// The probability of every action at the end, on request: no coordinator carries it from
     /// airplane to airplane, where it is empty.
     #[serde(skip)]
     pub chances: Vec<f64>,
+}
+
+/// The cost of a chosen joint action.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ReachedCost {
+    /// The objective `G`.
+    pub cost: f64,
+    /// A lower bound on `G` of every joint action.
+    pub bound: f64,
+}
+
+impl ReachedCost {
+    /// Returns the cost that an optimization has reached; none where it has no bound.
+    pub(crate) fn from_result(result: &OptimizeResult) -> Option<Self> {
+        result.bound.map(|bound| Self { cost: result.cost, bound })
+    }
+
+    /// Returns whether no joint action costs less, by the bound.
+    pub(crate) fn is_proved_minimum(&self) -> bool {
+        is_at_bound(self.cost, self.bound)
+    }
 }
 
 /// Outcome of an agent that optimizes.

@@ -109,6 +109,7 @@ impl CommonKnowledge {
             expected: player.expected().to_vec(),
             rounds,
             converged: calm >= stop.calm_rounds,
+            reached: None,
             chances: player.q.clone(),
         })
     }

@@ -2,6 +2,7 @@
 //! them: numbers of samples, or distributions.
 
 mod check;
+mod search;
 
 use super::optimizer::{Optimizer, OptimizerStep};
 use super::ownship::Ownship;
@@ -10,8 +11,12 @@ use super::traffic_state::StateBeacon;
 use super::{ActionChoice, MessageLimits};
 use crate::flight::{KnownAircraft, Point, Prediction};
 use crate::objective::{ActionPredictions, add_pair_costs, own_costs};
+use search::{LocalSearchAgent, SearchMember, SearchPeer, SearchStep};
+pub use search::{SearchBound, SearchMessage, SearchStart};
 use serde::{Deserialize, Serialize};
-use sidestep_collectives::{Estimator, Game, PairwiseGame, Player, UpdateOrder};
+use sidestep_collectives::{
+    Estimator, Game, LocalSearch, PairwiseGame, Player, UpdateOrder, start_strategies,
+};
 use std::collections::BTreeMap;
 
 /// Messages between agents.
@@ -57,6 +62,8 @@ pub enum PredictionSharingMessage {
         /// Probabilities of the actions.
         q: Vec<f64>,
     },
+    /// What the local search after the rounds needs.
+    Search(SearchMessage),
 }
 
 /// A member of the group, as an agent knows it.
@@ -68,6 +75,7 @@ struct PredictionSharingMember {
     q: BTreeMap<u32, Vec<f64>>,
     samples: BTreeMap<u32, Vec<usize>>,
     changes: BTreeMap<u32, f64>,
+    search: SearchMember,
     /// Whether nothing more is heard from it: its last message holds for all later rounds.
     gone: bool,
 }
@@ -123,6 +131,8 @@ pub struct PredictionSharingAgent {
     /// Number of rounds made.
     round: u32,
     calm: u32,
+    /// The local search, once the rounds are over.
+    search: Option<LocalSearchAgent>,
 }
 
 impl PredictionSharingAgent {
@@ -132,7 +142,7 @@ impl PredictionSharingAgent {
             (0..own.common.ids.len()).map(|_| PredictionSharingMember::default()).collect();
         members[own.me].options = Some(own.options.clone());
         let player = Player::new(own.options.predictions.len());
-        Self { own, by_model, members, game: None, player, round: 0, calm: 0 }
+        Self { own, by_model, members, game: None, player, round: 0, calm: 0, search: None }
     }
 
     fn model_message(&self) -> PredictionSharingMessage {
@@ -153,6 +163,12 @@ impl PredictionSharingAgent {
             orders,
             altitude_m,
         }
+    }
+
+    /// Returns the number of starts of the local search.
+    fn starts(&self) -> usize {
+        // The choice after the rounds, and the action that is cheapest for each alone.
+        2 + self.own.settings().random_starts as usize
     }
 
     fn has_exact_estimator(&self) -> bool {
@@ -189,7 +205,9 @@ impl PredictionSharingAgent {
     fn awaited_in_round(&self) -> Vec<usize> {
         let mut awaited = Vec::new();
         for (j, member) in self.members.iter().enumerate() {
-            let is_missing = if !self.has_exact_estimator() {
+            let is_missing = if let Some(search) = &self.search {
+                !member.gone && !search.has_heard(&member.search)
+            } else if !self.has_exact_estimator() {
                 let has_drawn = self.members[self.own.me].samples.contains_key(&self.round);
                 has_drawn && member.samples(self.round).is_none()
             } else if self.has_updated_distribution() {
@@ -228,7 +246,51 @@ impl PredictionSharingAgent {
         }
         let stop = self.own.settings().stop;
         let is_over = self.calm >= stop.calm_rounds || round >= stop.max_rounds;
-        if is_over { OptimizerStep::Conclude } else { OptimizerStep::Done }
+        match self.own.settings().local_search {
+            _ if !is_over => OptimizerStep::Done,
+            LocalSearch::None => OptimizerStep::Conclude,
+            LocalSearch::Pairs => self.start_search(),
+        }
+    }
+
+    /// Begins the local search with its own starts.
+    fn start_search(&mut self) -> OptimizerStep<PredictionSharingMessage> {
+        let Some(game) = &self.game else { return OptimizerStep::Conclude };
+        let me = self.own.me;
+        let config = self.own.settings();
+        let chosen = self.player.choose(config.choice, self.own.uniform(0));
+        let draws = config.start_draws(0).map(|k| self.own.uniform(k));
+        let actions = start_strategies(game, me, chosen, draws);
+        let (search, message) = LocalSearchAgent::new(game, me, &actions);
+        self.search = Some(search);
+        self.members[me].search.receive(message.clone());
+        OptimizerStep::Send(PredictionSharingMessage::Search(message))
+    }
+
+    fn search_step(&mut self) -> OptimizerStep<PredictionSharingMessage> {
+        let (Some(game), Some(search)) = (&self.game, &mut self.search) else {
+            return OptimizerStep::Conclude;
+        };
+        let choice = self.own.settings().choice;
+        let mut group = Vec::with_capacity(self.members.len());
+        for (place, member) in self.members.iter().enumerate() {
+            let q = member.action_distribution(self.round);
+            let u = self.own.common.uniform(place, 0);
+            let actions = game.strategies()[place];
+            group.push(SearchPeer {
+                said: &member.search,
+                is_gone: member.gone,
+                chosen: q.map_or(0, |q| choice.choose(q, u)).min(actions - 1),
+                actions,
+            });
+        }
+        match search.step(game, &group) {
+            SearchStep::Over => OptimizerStep::Conclude,
+            SearchStep::Send(message) => {
+                self.members[self.own.me].search.receive(message.clone());
+                OptimizerStep::Send(PredictionSharingMessage::Search(message))
+            }
+        }
     }
 
     fn update_exact_distribution(&mut self, round: u32) -> PredictionSharingMessage {
@@ -346,8 +408,11 @@ impl Optimizer for PredictionSharingAgent {
         let predictions = if self.by_model { 0 } else { actions };
         // A probability takes 8 bytes, and the number of an action at most 3.
         let bytes = common.max_message_bytes(predictions) + 8 * actions + 3 * block;
-        // Its predictions or its model, and a message for each round.
-        MessageLimits { bytes, messages: rounds.saturating_add(2) }
+        let (search_messages, search_bytes) =
+            SearchMessage::limits(self.starts(), actions, self.members.len());
+        // Its predictions or its model, a message for each round, and those of the local search.
+        let messages = rounds.saturating_add(2).saturating_add(search_messages);
+        MessageLimits { bytes: bytes.max(512 + search_bytes), messages }
     }
 
     fn receive(&mut self, from: usize, message: PredictionSharingMessage) {
@@ -356,7 +421,13 @@ impl Optimizer for PredictionSharingAgent {
             PredictionSharingMessage::Predictions { beacon, predictions } => {
                 let StateBeacon { separation_m, levels, .. } = beacon;
                 let frame = self.own.common.frame(from);
-                let options = ActionPredictions::new(predictions, frame, separation_m, levels);
+                let common = &self.own.common;
+                let options = ActionPredictions::new(predictions, frame, separation_m, levels)
+                    .with_non_cooperative(
+                        &common.non_cooperative,
+                        &common.objective,
+                        common.air.timing.dtau_s,
+                    );
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
@@ -377,6 +448,7 @@ impl Optimizer for PredictionSharingAgent {
                 member.q.insert(round, q);
                 member.changes.insert(round, change);
             }
+            PredictionSharingMessage::Search(message) => member.search.receive(message),
         }
     }
 
@@ -391,6 +463,9 @@ impl Optimizer for PredictionSharingAgent {
         if self.game.is_none() {
             self.start_game();
             return OptimizerStep::Done;
+        }
+        if self.search.is_some() {
+            return self.search_step();
         }
         match self.own.settings().estimator {
             Estimator::Exact => self.exact_optimizer_step(),
@@ -417,7 +492,15 @@ impl Optimizer for PredictionSharingAgent {
     }
 
     fn action_choice(&self) -> Option<ActionChoice> {
-        self.own.action_choice(&self.player, self.round, self.calm)
+        let mut choice = self.own.action_choice(&self.player, self.round, self.calm)?;
+        if let Some(search) = &self.search {
+            choice.reached = search.reached();
+            if let Some((chosen, costs)) = search.end() {
+                choice.chosen = chosen;
+                choice.expected = costs.to_vec();
+            }
+        }
+        Some(choice)
     }
 
     fn take_beacons(&mut self) -> Vec<Option<StateBeacon>> {

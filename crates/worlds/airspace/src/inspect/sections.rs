@@ -1,8 +1,9 @@
 //! Actions with their expected results, the shield, the conversation, and the outcome.
 
 use super::{Inspector, airplane};
+use crate::agents::ActionChoice;
 use crate::agents::network_traffic::NetworkTraffic;
-use crate::decide::decide_centrally;
+use crate::decide::{decide_centrally, joint_action_cost};
 use crate::events::EventKind;
 use crate::flight::{Point, Pose2};
 use crate::method::MethodKind;
@@ -16,6 +17,16 @@ use sidestep_kernel::view::{
 const MAX_POINTS: usize = 32;
 /// Weight of predicted paths without a known probability: faint, and visible.
 const UNKNOWN_WEIGHT: f64 = 0.2;
+
+/// Groups of up to this many airplanes are shown their true minimum, which takes some milliseconds.
+const MAX_MINIMUM_AIRPLANES: usize = 8;
+
+/// What the joint action of a group costs, as far as it is known.
+struct JointCosts {
+    cost: Option<f64>,
+    bound: Option<f64>,
+    minimum: Option<f64>,
+}
 
 impl Inspector<'_> {
     /// Adds the actions of the airplane, and the one that it chooses.
@@ -55,13 +66,31 @@ impl Inspector<'_> {
                 shape,
             );
         }
+        let JointCosts { cost, bound, minimum } = self.joint_costs(decided);
         inspection.add_section(
             section
                 .fact("action", actions[decided.chosen].to_string())
                 .fact("rounds", FactValue::count(decided.rounds))
                 .fact("has settled", decided.converged)
+                .fact("cost of all together", cost.map(|cost| FactValue::number(cost, "")))
+                .fact("at least", bound.map(|bound| FactValue::number(bound, "")))
+                .fact("true minimum", minimum.map(|least| FactValue::number(least, "")))
                 .table(table),
         );
+    }
+
+    /// Returns what the actions of the whole group cost: as the airplane knows, or in a small group as one who knows all
+    /// computes it.
+    fn joint_costs(&self, decided: &ActionChoice) -> JointCosts {
+        let InspectionTrace { group, non_cooperative, joint, .. } = &self.trace;
+        let joint = joint.as_ref().filter(|joint| joint.len() <= MAX_MINIMUM_AIRPLANES);
+        let known = joint.map(|joint| joint_action_cost(self.world, group, non_cooperative, joint));
+        let reached = known.as_ref().map(|known| known.reached).or(decided.reached);
+        JointCosts {
+            cost: reached.map(|reached| reached.cost),
+            bound: reached.map(|reached| reached.bound),
+            minimum: known.and_then(|known| known.minimum),
+        }
     }
 
     /// Returns the probabilities of its actions. A coordinator does not carry them along; where no

@@ -1,8 +1,8 @@
 //! Controls: the maneuver of an airplane in a cycle, and the outcome of its conversations.
 
-use crate::agents::ActionChoice;
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::agents::traffic_state::TrafficPicture;
+use crate::agents::{ActionChoice, ReachedCost};
 use crate::baseline::mvp::ActiveResolutions;
 use crate::decide::ManeuverCandidates;
 use crate::events::Event;
@@ -50,7 +50,7 @@ pub enum Maneuver {
 }
 
 /// Outcome of an optimization for an airplane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct OptimizationStatus {
     /// Whether a decision has reached it.
     pub is_decided: bool,
@@ -58,6 +58,10 @@ pub struct OptimizationStatus {
     pub rounds: u32,
     /// Whether the distributions had settled.
     pub converged: bool,
+    /// The chosen action, by its number; 0 if no decision has reached it.
+    pub chosen: u32,
+    /// The cost of the joint action, where the airplane knows it.
+    pub reached: Option<ReachedCost>,
 }
 
 /// The memory of an airplane from one cycle to the next.
@@ -114,9 +118,13 @@ impl OptimizationStatus {
     /// Returns the outcome with a decision, or without one.
     pub(crate) fn from_choice(decided: Option<&ActionChoice>) -> Self {
         match decided {
-            Some(ActionChoice { rounds, converged, .. }) => {
-                Self { is_decided: true, rounds: *rounds, converged: *converged }
-            }
+            Some(ActionChoice { rounds, converged, chosen, reached, .. }) => Self {
+                is_decided: true,
+                rounds: *rounds,
+                converged: *converged,
+                chosen: *chosen as u32,
+                reached: *reached,
+            },
             None => Self::default(),
         }
     }

@@ -142,6 +142,7 @@ impl<'a> Compiler<'a> {
             orca: section.orca.or_default(ORCA),
             deployment: section.deployment,
             groups: section.groups.as_ref().map(|given| *given.get_ref()).unwrap_or_default(),
+            minimum_up_to: section.minimum_up_to.map_or(0, |airplanes| airplanes.get() as usize),
             group_bytes: (section.group_memory_gib.map_or(2.0, f64::from) * GIB) as u64,
             shield: section.shield.0,
             vertical_m,

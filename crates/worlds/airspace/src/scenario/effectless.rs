@@ -61,6 +61,9 @@ fn optimizer_keys(section: &AirspaceSection) -> Vec<&'static str> {
         ("cooling", section.cooling.is_some()),
         ("max_rounds", section.max_rounds.is_some()),
         ("choice", section.choice.is_some()),
+        ("local_search", section.local_search.is_some()),
+        ("random_starts", section.random_starts.is_some()),
+        ("minimum_up_to", section.minimum_up_to.is_some()),
         ("group_memory_gib", section.group_memory_gib.is_some()),
     ];
     given.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key).collect()

@@ -8,13 +8,16 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
 use sidestep_collectives::{
-    Choice, Estimator, OptimizerConfig, StopCriterion, Update, UpdateOrder, Utility,
+    Choice, Estimator, LocalSearch, OptimizerConfig, StopCriterion, Update, UpdateOrder, Utility,
 };
 use sidestep_kernel::{InputError, math};
 use sidestep_scenario::{Closed, LeftOpen, Number, Rule as _, invalid_value, schema_by_hand};
 
 /// Largest number of samples of a block. All of them are kept in memory, and with more an exact estimator is faster.
 const MAX_BLOCK_SAMPLES: usize = 10_000;
+/// Random starts of a local search. With this number it finds the minimum in 98 of 100 games of ten airplanes, with half
+/// of it in 95, and takes less time than the rounds.
+const RANDOM_STARTS: u32 = 8;
 /// Largest number of times in a list. Each adds as many actions as there are turn rates, and the cost of a pair grows
 /// with the square of the number of actions.
 const MAX_TIMES: usize = 20;
@@ -161,19 +164,48 @@ impl Compiler<'_> {
         let estimator = self.estimator()?.unwrap_or(estimator);
         let choice = if is_paper { Choice::Draw } else { Choice::Argmax };
         let order = if is_paper { UpdateOrder::Parallel } else { UpdateOrder::Sequence };
+        let local_search = self.local_search(estimator)?;
         Ok(OptimizerConfig {
             estimator,
             update: self.update_rule()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
             order: section.order.unwrap_or(order),
             utility: self.utility(estimator)?,
-            cooling: section.cooling.map_or(if is_paper { 0.8 } else { 0.7 }, f64::from),
+            cooling: section.cooling.map_or(if is_paper { 0.8 } else { 0.5 }, f64::from),
             stop: StopCriterion {
                 threshold: 1e-3,
                 calm_rounds: 3,
                 max_rounds: section.max_rounds.map_or(200, |rounds| rounds.0),
             },
             choice: section.choice.unwrap_or(choice),
+            local_search,
+            random_starts: self.random_starts(local_search)?,
         })
+    }
+
+    /// Returns what follows the rounds. Samples show the costs of joint moves, and a local search asks for those of
+    /// single players.
+    fn local_search(&self, estimator: Estimator) -> Result<LocalSearch, InputError> {
+        let is_exact = estimator == Estimator::Exact;
+        let default = if is_exact { LocalSearch::Pairs } else { LocalSearch::None };
+        let Some(given) = &self.file.airspace.local_search else { return Ok(default) };
+        if !is_exact && *given.get_ref() != LocalSearch::None {
+            let cause = "a local search after sampled rounds, which know no single costs";
+            let remedy = "set estimator = { kind = \"exact\" }, or leave local_search out";
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
+        Ok(*given.get_ref())
+    }
+
+    fn random_starts(&self, local_search: LocalSearch) -> Result<u32, InputError> {
+        let Some(given) = &self.file.airspace.random_starts else {
+            return Ok(RANDOM_STARTS);
+        };
+        if local_search == LocalSearch::None {
+            let cause = "random_starts, but no local search that would start there";
+            let remedy = "set local_search = \"pairs\", or leave random_starts out";
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
+        Ok(given.get_ref().get() as u32)
     }
 
     fn estimator(&self) -> Result<Option<Estimator>, InputError> {

@@ -3,7 +3,7 @@
 
 use super::epoch::CoordinatorEpoch;
 use crate::agents::traffic_state::StateBeacon;
-use crate::agents::{ActionChoice, CommonKnowledge, Ownship};
+use crate::agents::{ActionChoice, CommonKnowledge, Ownship, ReachedCost};
 use crate::flight::{FlightLevelRange, PairPlane, Prediction};
 use crate::objective::{ActionPredictions, add_pair_costs, own_costs};
 use serde::{Deserialize, Serialize};
@@ -170,6 +170,7 @@ impl OptimizationProgress {
         let outcome = optimize(&game, &common.settings, |player: usize, k: u64| {
             common.uniform(places[player], k)
         });
+        let reached = ReachedCost::from_result(&outcome);
         let each = outcome.joint.into_iter().zip(outcome.expected).zip(outcome.q);
         for (airplane, ((chosen, expected), chances)) in self.airplanes.iter_mut().zip(each) {
             let decided = ActionChoice {
@@ -177,6 +178,7 @@ impl OptimizationProgress {
                 expected,
                 rounds: outcome.rounds,
                 converged: outcome.converged,
+                reached,
                 chances,
             };
             airplane.decided = (!airplane.is_presumed).then_some(decided);

@@ -1,8 +1,9 @@
 //! Checks of the others' messages, before an agent accepts them.
 
+use super::search::SearchLimits;
 use super::{PredictionSharingAgent, PredictionSharingMessage};
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
-use sidestep_collectives::Estimator;
+use sidestep_collectives::{Estimator, LocalSearch};
 
 impl PredictionSharingAgent {
     /// Checks a message of the agent at place `from`.
@@ -53,6 +54,13 @@ impl PredictionSharingAgent {
                 // The sum is rounded.
                 let is_complete = (q.iter().sum::<f64>() - 1.0).abs() < 1e-6;
                 InvalidMessage::Number.ensure(is_complete && are_probabilities)
+            }
+            PredictionSharingMessage::Search(message) => {
+                let is_local = self.own.settings().local_search == LocalSearch::Pairs;
+                InvalidMessage::Kind.ensure(is_local)?;
+                let actions: Vec<usize> =
+                    common.filed.iter().map(|one| one.actions.len()).collect();
+                message.check(from, &SearchLimits { actions: &actions, starts: self.starts() })
             }
         }
     }

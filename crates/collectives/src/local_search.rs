@@ -1,0 +1,451 @@
+//! Local search from the outcome of the rounds and from further starts: moves of one or two players at a time.
+//!
+//! It is the algorithm MGM-2 (Maheswaran, Pearce and Tambe 2004) without its random draws. In a step every player
+//! tells the cost of each of its strategies beside those of the others, then the move of itself, or of itself and
+//! one later neighbor, that saves most; moves that do not touch each other are made at once. A joint move from which no
+//! two players can save anything is *2-optimal*; of all starts, the cheapest end is taken.
+//!
+//! [`optimize`](super::optimize) runs it in one process. Players that know only the pairs that they are part of run
+//! the same functions on messages, and come to the same bits.
+
+use super::game::{Game, PairwiseGame};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sidestep_kernel::interrupt;
+
+/// A move has to save more than this share of what its players pay: less is rounding, which might be saved forever.
+const MIN_SAVED_SHARE: f64 = 1e-9;
+/// The share by which a cost may be above a lower bound and counts as equal to it: both are rounded.
+const BOUND_TOLERANCE: f64 = 1e-9;
+/// What follows the rounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LocalSearch {
+    /// Nothing: the players take strategies from their distributions, as in the paper.
+    #[default]
+    None,
+    /// Moves of one or two players, until none saves anything.
+    Pairs,
+}
+
+/// New strategies of a player, and maybe of a later one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PairMove {
+    /// The cost that it saves.
+    pub gain: f64,
+    /// The new strategy of the player.
+    pub strategy: usize,
+    /// The other player with its new strategy, if it moves too.
+    pub partner: Option<(usize, usize)>,
+}
+
+/// The costs of a player in a descent.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct PlayerCosts {
+    /// The part of the joint move's cost that it bears.
+    pub cost: f64,
+    /// The cost that each of its strategies has beside the strategies of the others, up to a constant.
+    pub given: Vec<f64>,
+}
+
+/// The search from one start.
+#[derive(Debug, Clone)]
+struct Descent {
+    joint: Vec<usize>,
+    /// Costs of each player.
+    players: Vec<PlayerCosts>,
+    is_settled: bool,
+}
+
+/// The searches from all starts, which take their steps together.
+#[derive(Debug, Clone, Default)]
+pub struct Descents {
+    /// Each player's neighbors: those with which it shares a cost.
+    neighbors: Vec<Vec<usize>>,
+    descents: Vec<Descent>,
+    /// Number of steps made.
+    steps: u32,
+}
+
+impl Descents {
+    /// Largest number of steps, which all save something. Fifty players take about 30.
+    pub const MAX_STEPS: u32 = 1000;
+
+    /// Creates searches. `starts` are each player's strategies, one a start; `neighbors` those with which it shares a
+    /// cost.
+    pub fn new(neighbors: Vec<Vec<usize>>, starts: &[Vec<usize>]) -> Self {
+        let count = starts.iter().map(Vec::len).min().unwrap_or(0);
+        let descents = (0..count).map(|start| Descent {
+            joint: starts.iter().map(|strategies| strategies[start]).collect(),
+            players: vec![PlayerCosts::default(); starts.len()],
+            is_settled: false,
+        });
+        Self { descents: descents.collect(), neighbors, steps: 0 }
+    }
+
+    /// Returns the descents that are not settled.
+    fn open(&self) -> impl Iterator<Item = &Descent> {
+        self.descents.iter().filter(|descent| !descent.is_settled)
+    }
+
+    /// Returns the number of descents that are not settled.
+    pub fn count_open(&self) -> usize {
+        self.open().count()
+    }
+
+    /// Returns the number of steps made.
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Returns the costs of a player in each open descent.
+    pub fn player_costs(&self, game: &PairwiseGame, player: usize) -> Vec<PlayerCosts> {
+        self.open().map(|descent| game.player_costs(player, &descent.joint)).collect()
+    }
+
+    /// Sets the costs of a player in each open descent.
+    pub fn set_player_costs(&mut self, player: usize, costs: Vec<PlayerCosts>) {
+        let open = self.descents.iter_mut().filter(|descent| !descent.is_settled);
+        for (descent, costs) in open.zip(costs) {
+            descent.players[player] = costs;
+        }
+    }
+
+    /// Lets a player of unknown costs keep its strategy in each open descent: every other one seems infinitely dear.
+    pub fn keep_strategy(&mut self, game: &PairwiseGame, player: usize) {
+        for descent in self.descents.iter_mut().filter(|descent| !descent.is_settled) {
+            let mut given = vec![f64::INFINITY; game.strategies()[player]];
+            given[descent.joint[player]] = 0.0;
+            let cost = game.player_cost(&descent.joint, player);
+            descent.players[player] = PlayerCosts { cost, given };
+        }
+    }
+
+    /// Returns the best move of a player in each open descent, when the costs of all are set.
+    pub fn player_moves(&self, game: &PairwiseGame, player: usize) -> Vec<Option<PairMove>> {
+        let best = |descent: &Descent| game.best_move(player, &descent.joint, &descent.players);
+        self.open().map(best).collect()
+    }
+
+    /// Makes a step by the moves of all players (shape: players, open descents).
+    pub fn step(&mut self, moves: &[Vec<Option<PairMove>>]) {
+        self.steps += 1;
+        let mut open = 0;
+        for descent in self.descents.iter_mut().filter(|descent| !descent.is_settled) {
+            let mut offers: Vec<(usize, PairMove)> = Vec::new();
+            for (player, moves) in moves.iter().enumerate() {
+                offers.extend(moves.get(open).copied().flatten().map(|offer| (player, offer)));
+            }
+            open += 1;
+            // After the last step nobody would learn what its moves cost.
+            descent.is_settled = offers.is_empty() || self.steps >= Self::MAX_STEPS;
+            if !descent.is_settled {
+                make_moves(&mut descent.joint, offers, &self.neighbors);
+            }
+        }
+    }
+
+    /// Returns the first start, before the first step.
+    pub fn first_joint(&self) -> &[usize] {
+        &self.descents[0].joint
+    }
+
+    /// Returns the number of neighbors of each player.
+    pub fn neighbor_counts(&self) -> Vec<usize> {
+        self.neighbors.iter().map(Vec::len).collect()
+    }
+
+    /// Returns the cheapest descent; among equals the first.
+    fn best(&self) -> &Descent {
+        let mut best = &self.descents[0];
+        for descent in &self.descents[1..] {
+            if descent.cost() < best.cost() {
+                best = descent;
+            }
+        }
+        best
+    }
+
+    /// Returns the cheapest joint move of all descents.
+    pub fn best_joint(&self) -> &[usize] {
+        &self.best().joint
+    }
+
+    /// Returns its cost.
+    pub fn best_cost(&self) -> f64 {
+        self.best().cost()
+    }
+
+    /// Returns the cost that each strategy of a player has beside the strategies of the others in it.
+    pub fn best_costs_given(&self, player: usize) -> &[f64] {
+        &self.best().players[player].given
+    }
+}
+
+impl Descent {
+    fn cost(&self) -> f64 {
+        self.players.iter().fold(0.0, |sum, player| sum + player.cost)
+    }
+}
+
+/// Makes the moves that save most and do not touch each other, so that what they save adds up.
+fn make_moves(joint: &mut [usize], mut offers: Vec<(usize, PairMove)>, neighbors: &[Vec<usize>]) {
+    offers.sort_by(|(i, a), (j, b)| b.gain.total_cmp(&a.gain).then(i.cmp(j)));
+    let mut touched = vec![false; joint.len()];
+    for (player, offer) in offers {
+        let partner = offer.partner.map(|(partner, _)| partner);
+        let movers: Vec<usize> = [Some(player), partner].into_iter().flatten().collect();
+        if movers.iter().any(|&mover| touched[mover]) {
+            continue;
+        }
+        joint[player] = offer.strategy;
+        if let Some((partner, strategy)) = offer.partner {
+            joint[partner] = strategy;
+        }
+        for mover in movers {
+            touched[mover] = true;
+            neighbors[mover].iter().for_each(|&neighbor| touched[neighbor] = true);
+        }
+    }
+}
+
+/// Returns whether a cost cannot be improved upon, by a lower bound.
+pub fn is_at_bound(cost: f64, bound: f64) -> bool {
+    cost - bound <= BOUND_TOLERANCE * cost.abs()
+}
+
+/// Returns the strategy of a player in each start: its own choice from the rounds, the cheapest one if it were alone,
+/// and one for each of some uniform numbers in [0, 1).
+pub fn start_strategies(
+    game: &PairwiseGame,
+    player: usize,
+    chosen: usize,
+    uniform: impl Iterator<Item = f64>,
+) -> Vec<usize> {
+    let strategies = game.strategies()[player];
+    let drawn = uniform.map(|u| ((u * strategies as f64) as usize).min(strategies - 1));
+    [chosen, game.cheapest_alone(player)].into_iter().chain(drawn).collect()
+}
+
+/// Returns the searches from some starts (shape: players, starts) at their ends.
+pub(super) fn run_descents(game: &PairwiseGame, starts: &[Vec<usize>]) -> Descents {
+    let players = starts.len();
+    let neighbors = (0..players).map(|player| game.neighbors(player).collect()).collect();
+    let mut descents = Descents::new(neighbors, starts);
+    while descents.count_open() > 0 {
+        interrupt::check();
+        for player in 0..players {
+            let costs = descents.player_costs(game, player);
+            descents.set_player_costs(player, costs);
+        }
+        let moves: Vec<_> =
+            (0..players).map(|player| descents.player_moves(game, player)).collect();
+        descents.step(&moves);
+    }
+    descents
+}
+
+impl PairwiseGame {
+    /// Returns the players with which a player shares a cost, by number.
+    pub fn neighbors(&self, player: usize) -> impl Iterator<Item = usize> {
+        self.player_pairs[player].iter().map(move |&index| self.pairs[index].other(player))
+    }
+
+    /// Returns the strategy of a player that costs least without the others; among equals the first.
+    fn cheapest_alone(&self, player: usize) -> usize {
+        lowest(&self.own[player]).0
+    }
+
+    /// Returns the costs of a player in a joint move.
+    fn player_costs(&self, player: usize, joint: &[usize]) -> PlayerCosts {
+        let mut given = self.own[player].clone();
+        for &index in &self.player_pairs[player] {
+            let pair = &self.pairs[index];
+            let row = pair.given(pair.other(player)).row(joint[pair.other(player)]);
+            given.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost);
+        }
+        PlayerCosts { cost: self.player_cost(joint, player), given }
+    }
+
+    /// Returns the move of a player, or of it and a later neighbor, that saves most; `None` if none does. `players` are
+    /// the costs of all in the joint move.
+    fn best_move(
+        &self,
+        player: usize,
+        joint: &[usize],
+        players: &[PlayerCosts],
+    ) -> Option<PairMove> {
+        let own = &players[player].given;
+        let now = own[joint[player]];
+        let (strategy, cost) = lowest(own);
+        let mut best = PairMove { gain: MIN_SAVED_SHARE * now.abs(), strategy, partner: None };
+        let mut is_found = now - cost > best.gain;
+        if is_found {
+            best.gain = now - cost;
+        }
+        for &index in &self.player_pairs[player] {
+            let pair = &self.pairs[index];
+            let other = pair.other(player);
+            // The pair is that of the earlier player.
+            if other < player {
+                continue;
+            }
+            let others = &players[other].given;
+            let table = pair.given(player);
+            let now = now + others[joint[other]] - table.row(joint[player])[joint[other]];
+            let of_own = pair.given(other).row(joint[other]);
+            let of_other = table.row(joint[player]);
+            let rest: Vec<f64> =
+                others.iter().zip(of_other).map(|(sum, cost)| sum - cost).collect();
+            let min_rest = lowest(&rest).1 + table.min;
+            let min_gain = best.gain.max(MIN_SAVED_SHARE * now.abs());
+            let mut min_cost = now - min_gain;
+            for (x, (sum, cost)) in own.iter().zip(of_own).enumerate() {
+                let own_rest = sum - cost;
+                // No strategy of the other can be good enough.
+                if own_rest + min_rest >= min_cost {
+                    continue;
+                }
+                for (y, (rest, cost)) in rest.iter().zip(table.row(x)).enumerate() {
+                    let cost = own_rest + (rest + cost);
+                    if cost < min_cost {
+                        min_cost = cost;
+                        is_found = true;
+                        best =
+                            PairMove { gain: now - cost, strategy: x, partner: Some((other, y)) };
+                    }
+                }
+            }
+        }
+        is_found.then_some(best)
+    }
+
+    /// Returns a player's part of a lower bound on the cost of every joint move: the sum of the parts of all players is
+    /// one. `neighbors` is the number of neighbors of each player.
+    ///
+    /// The cost is divided into stars of a player and its neighbors: half of each pair, and of a player's own cost an
+    /// equal share for each star that it is in. Each star alone is minimized exactly.
+    pub fn bound_part(&self, player: usize, neighbors: &[usize]) -> f64 {
+        let share = |player: usize| 1.0 / (neighbors[player] + 1) as f64;
+        let own_share = share(player);
+        let mut costs: Vec<f64> = self.own[player].iter().map(|cost| own_share * cost).collect();
+        for &index in &self.player_pairs[player] {
+            let pair = &self.pairs[index];
+            let other = pair.other(player);
+            let other_share = share(other);
+            let others: Vec<f64> = self.own[other].iter().map(|cost| other_share * cost).collect();
+            let free = lowest(&others).1;
+            let table = pair.given(player);
+            let mut nonzero = table.nonzero_rows.iter().peekable();
+            for (x, sum) in costs.iter_mut().enumerate() {
+                if nonzero.next_if(|row| **row == x).is_none() {
+                    *sum += free;
+                    continue;
+                }
+                let least = others.iter().zip(table.row(x)).map(|(own, cost)| own + 0.5 * cost);
+                *sum += least.fold(f64::INFINITY, f64::min);
+            }
+        }
+        lowest(&costs).1
+    }
+
+    /// Returns a lower bound on the cost of every joint move.
+    pub fn lower_bound(&self) -> f64 {
+        let players = self.strategies().len();
+        let neighbors: Vec<usize> =
+            (0..players).map(|player| self.neighbors(player).count()).collect();
+        (0..players).fold(0.0, |sum, player| sum + self.bound_part(player, &neighbors))
+    }
+}
+
+/// Returns the place of the lowest cost, the first among equals, and that cost.
+fn lowest(costs: &[f64]) -> (usize, f64) {
+    let mut best = 0;
+    for x in 1..costs.len() {
+        if costs[x] < costs[best] {
+            best = x;
+        }
+    }
+    (best, costs[best])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::game::tests::{game, joints};
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Returns the searches from one start.
+    fn descend_from(game: &PairwiseGame, start: &[usize]) -> Descents {
+        let starts: Vec<Vec<usize>> = start.iter().map(|&x| vec![x]).collect();
+        run_descents(game, &starts)
+    }
+
+    proptest! {
+        #[test]
+        fn no_two_players_can_save_anything_at_the_end_of_a_descent(
+            sizes in prop::collection::vec(1usize..4, 1..5),
+            costs in prop::collection::vec(-5.0f64..5.0, 7..60),
+        ) {
+            let game = game(&sizes, &costs);
+            let descents = descend_from(&game, &vec![0; sizes.len()]);
+            let end = descents.best_joint();
+            prop_assert!((descents.best_cost() - game.cost(end)).abs() < 1e-9);
+            for joint in joints(&sizes) {
+                let apart = joint.iter().zip(end).filter(|(a, b)| a != b).count();
+                prop_assert!(apart > 2 || game.cost(&joint) >= descents.best_cost() - 1e-6);
+            }
+        }
+
+        #[test]
+        fn no_joint_move_is_cheaper_than_the_lower_bound(
+            sizes in prop::collection::vec(1usize..4, 1..5),
+            costs in prop::collection::vec(-5.0f64..5.0, 7..60),
+        ) {
+            let game = game(&sizes, &costs);
+            let bound = game.lower_bound();
+            for joint in joints(&sizes) {
+                prop_assert!(game.cost(&joint) >= bound - 1e-9, "{bound}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_players_find_their_minimum_from_every_start() {
+        let costs: Vec<f64> = (0..40u32).map(|k| f64::from(k * k * 7 % 31)).collect();
+        let game = game(&[5, 6], &costs);
+        let least =
+            joints(&[5, 6]).iter().map(|joint| game.cost(joint)).fold(f64::INFINITY, f64::min);
+        for start in joints(&[5, 6]) {
+            assert_eq!(descend_from(&game, &start).best_cost(), least, "{start:?}");
+        }
+        // A single pair is one star.
+        assert!(is_at_bound(least, game.lower_bound()));
+    }
+
+    #[test]
+    fn the_cheapest_end_of_all_starts_is_taken() {
+        // Both prefer to choose the same, and cheapest of all is 1; moves of both find it from anywhere, so that a
+        // third player is needed for an end that is not the minimum.
+        let mut game = PairwiseGame::new(vec![vec![1.0, 0.0]; 3]);
+        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+            game.add_pair(a, b, vec![0.0, 9.0, 9.0, 0.0]);
+        }
+        assert_eq!(descend_from(&game, &[0, 0, 0]).best_cost(), 3.0);
+        let descents = run_descents(&game, &[vec![0, 1], vec![0, 1], vec![0, 0]]);
+        assert_eq!(descents.best_joint(), [1, 1, 1]);
+        assert_eq!(descents.best_costs_given(0), [19.0, 0.0]);
+    }
+
+    #[test]
+    fn a_player_of_unknown_costs_keeps_its_strategy() {
+        let game = game(&[3, 3], &[1.0, 5.0, 2.0, 7.0, 3.0]);
+        let mut descents = Descents::new(vec![vec![1], vec![0]], &[vec![1], vec![1]]);
+        let costs = descents.player_costs(&game, 0);
+        descents.set_player_costs(0, costs);
+        descents.keep_strategy(&game, 1);
+        let moves = descents.player_moves(&game, 0);
+        let partner = moves[0].and_then(|one| one.partner);
+        assert!(partner.is_none_or(|(_, strategy)| strategy == 1), "{moves:?}");
+    }
+}
