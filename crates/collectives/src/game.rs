@@ -53,7 +53,9 @@ pub(super) struct CostTable {
     width: usize,
     costs: Vec<f64>,
     /// Rows with any cost that is not 0, in increasing order: most strategies of two airplanes do not conflict.
-    pub(super) nonzero_rows: Vec<usize>,
+    nonzero_rows: Vec<usize>,
+    /// Whether each row has any.
+    is_nonzero_row: Vec<bool>,
     /// The lowest cost of all.
     pub(super) min: f64,
 }
@@ -72,11 +74,17 @@ impl PairCosts {
 
 impl CostTable {
     fn new(width: usize, costs: Vec<f64>) -> Self {
-        let rows = costs.chunks_exact(width).enumerate();
-        let nonzero = rows.filter(|(_, costs)| costs.iter().any(|cost| *cost != 0.0));
-        let nonzero_rows = nonzero.map(|(row, _)| row).collect();
+        let rows = costs.chunks_exact(width);
+        let is_nonzero_row: Vec<bool> =
+            rows.map(|costs| costs.iter().any(|cost| *cost != 0.0)).collect();
+        let nonzero_rows = (0..is_nonzero_row.len()).filter(|&row| is_nonzero_row[row]).collect();
         let min = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        Self { width, costs, nonzero_rows, min }
+        Self { width, costs, nonzero_rows, is_nonzero_row, min }
+    }
+
+    /// Returns whether a row has any cost that is not 0.
+    pub(super) fn is_nonzero(&self, row: usize) -> bool {
+        self.is_nonzero_row[row]
     }
 
     pub(super) fn row(&self, row: usize) -> &[f64] {

@@ -8,7 +8,7 @@
 //! [`optimize`](super::optimize) runs it in one process. Players that know only the pairs that they are part of run
 //! the same functions on messages, and come to the same bits.
 
-use super::game::{Game, PairwiseGame};
+use super::game::{Game, PairCosts, PairwiseGame};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::interrupt;
@@ -54,6 +54,12 @@ struct Descent {
     joint: Vec<usize>,
     /// Costs of each player.
     players: Vec<PlayerCosts>,
+    /// The least cost that any strategy of each player has beside those of the others.
+    least: Vec<f64>,
+    /// Whether each player has moved, or its costs have changed, since the moves of the step before were found.
+    is_changed: Vec<bool>,
+    /// What each player and each of its neighbors can save by moving together, at most; infinite where it is unknown.
+    max_gains: Vec<Vec<f64>>,
     is_settled: bool,
 }
 
@@ -75,9 +81,14 @@ impl Descents {
     /// cost.
     pub fn new(neighbors: Vec<Vec<usize>>, starts: &[Vec<usize>]) -> Self {
         let count = starts.iter().map(Vec::len).min().unwrap_or(0);
+        let unknown_gains: Vec<Vec<f64>> =
+            neighbors.iter().map(|others| vec![f64::INFINITY; others.len()]).collect();
         let descents = (0..count).map(|start| Descent {
             joint: starts.iter().map(|strategies| strategies[start]).collect(),
             players: vec![PlayerCosts::default(); starts.len()],
+            least: vec![0.0; starts.len()],
+            is_changed: vec![true; starts.len()],
+            max_gains: unknown_gains.clone(),
             is_settled: false,
         });
         Self { descents: descents.collect(), neighbors, steps: 0 }
@@ -107,7 +118,7 @@ impl Descents {
     pub fn set_player_costs(&mut self, player: usize, costs: Vec<PlayerCosts>) {
         let open = self.descents.iter_mut().filter(|descent| !descent.is_settled);
         for (descent, costs) in open.zip(costs) {
-            descent.players[player] = costs;
+            descent.set_player_costs(player, costs);
         }
     }
 
@@ -117,14 +128,15 @@ impl Descents {
             let mut given = vec![f64::INFINITY; game.strategies()[player]];
             given[descent.joint[player]] = 0.0;
             let cost = game.player_cost(&descent.joint, player);
-            descent.players[player] = PlayerCosts { cost, given };
+            descent.set_player_costs(player, PlayerCosts { cost, given });
         }
     }
 
     /// Returns the best move of a player in each open descent, when the costs of all are set.
-    pub fn player_moves(&self, game: &PairwiseGame, player: usize) -> Vec<Option<PairMove>> {
-        let best = |descent: &Descent| game.best_move(player, &descent.joint, &descent.players);
-        self.open().map(best).collect()
+    pub fn player_moves(&mut self, game: &PairwiseGame, player: usize) -> Vec<Option<PairMove>> {
+        let open = self.descents.iter_mut().filter(|descent| !descent.is_settled);
+        let neighbors = &self.neighbors[player];
+        open.map(|descent| descent.best_move(game, player, neighbors)).collect()
     }
 
     /// Makes a step by the moves of all players (shape: players, open descents).
@@ -140,7 +152,20 @@ impl Descents {
             // After the last step nobody would learn what its moves cost.
             descent.is_settled = offers.is_empty() || self.steps >= Self::MAX_STEPS;
             if !descent.is_settled {
-                make_moves(&mut descent.joint, offers, &self.neighbors);
+                descent.make_moves(offers, &self.neighbors);
+            }
+        }
+        self.settle_duplicates();
+    }
+
+    /// Ends descents that have come to where another one is: from there on they are the same.
+    fn settle_duplicates(&mut self) {
+        for k in 1..self.descents.len() {
+            let (before, from) = self.descents.split_at_mut(k);
+            let descent = &mut from[0];
+            if !descent.is_settled && before.iter().any(|other| other.joint == descent.joint) {
+                descent.is_settled = true;
+                descent.players.iter_mut().for_each(|player| player.cost = f64::INFINITY);
             }
         }
     }
@@ -186,25 +211,108 @@ impl Descent {
     fn cost(&self) -> f64 {
         self.players.iter().fold(0.0, |sum, player| sum + player.cost)
     }
-}
 
-/// Makes the moves that save most and do not touch each other, so that what they save adds up.
-fn make_moves(joint: &mut [usize], mut offers: Vec<(usize, PairMove)>, neighbors: &[Vec<usize>]) {
-    offers.sort_by(|(i, a), (j, b)| b.gain.total_cmp(&a.gain).then(i.cmp(j)));
-    let mut touched = vec![false; joint.len()];
-    for (player, offer) in offers {
-        let partner = offer.partner.map(|(partner, _)| partner);
-        let movers: Vec<usize> = [Some(player), partner].into_iter().flatten().collect();
-        if movers.iter().any(|&mover| touched[mover]) {
-            continue;
+    fn set_player_costs(&mut self, player: usize, costs: PlayerCosts) {
+        if costs.given != self.players[player].given {
+            self.least[player] = lowest(&costs.given).1;
+            self.is_changed[player] = true;
         }
-        joint[player] = offer.strategy;
-        if let Some((partner, strategy)) = offer.partner {
-            joint[partner] = strategy;
+        self.players[player] = costs;
+    }
+
+    /// Returns the move of a player, or of it and a later neighbor, that saves most; `None` if none does.
+    /// `neighbors` are those of the player.
+    fn best_move(
+        &mut self,
+        game: &PairwiseGame,
+        player: usize,
+        neighbors: &[usize],
+    ) -> Option<PairMove> {
+        let own = &self.players[player].given;
+        let now = own[self.joint[player]];
+        let gain = now - self.least[player];
+        let mut best = None;
+        if gain > MIN_SAVED_SHARE * now.abs() {
+            best = Some(PairMove { gain, strategy: lowest(own).0, partner: None });
         }
-        for mover in movers {
-            touched[mover] = true;
-            neighbors[mover].iter().for_each(|&neighbor| touched[neighbor] = true);
+        let first_later = neighbors.partition_point(|&other| other < player);
+        for (place, &other) in neighbors.iter().enumerate().skip(first_later) {
+            let min_gain = best.map_or(0.0, |best| best.gain);
+            let is_changed = self.is_changed[player] || self.is_changed[other];
+            // Most pairs are as they were in the step before, which did not find enough.
+            if !is_changed && self.max_gains[player][place] <= min_gain {
+                continue;
+            }
+            let pair = game.neighbor_pair(player, place);
+            let found = self.best_move_of_two(pair, player, min_gain);
+            self.max_gains[player][place] = found.map_or(min_gain, |found| found.gain);
+            best = found.or(best);
+        }
+        best
+    }
+
+    /// Returns the move of a player and the other one of a pair that saves most; `None` if none saves more than
+    /// `min_gain`.
+    fn best_move_of_two(&self, pair: &PairCosts, player: usize, min_gain: f64) -> Option<PairMove> {
+        let other = pair.other(player);
+        let own = &self.players[player].given;
+        let others = &self.players[other].given;
+        let table = pair.given(player);
+        let of_own = pair.given(other).row(self.joint[other]);
+        let of_other = table.row(self.joint[player]);
+        // What they pay to each other counts once.
+        let now = own[self.joint[player]] + others[self.joint[other]] - of_other[self.joint[other]];
+        let mut min_cost = now - min_gain.max(MIN_SAVED_SHARE * now.abs());
+        // Costs without the pair's, of which most strategies have none.
+        let least_own = if pair.given(other).is_nonzero(self.joint[other]) {
+            least_difference(own, of_own)
+        } else {
+            self.least[player]
+        };
+        let least_other = if table.is_nonzero(self.joint[player]) {
+            least_difference(others, of_other)
+        } else {
+            self.least[other]
+        };
+        if least_own + least_other + table.min >= min_cost {
+            return None;
+        }
+        let rest: Vec<f64> = others.iter().zip(of_other).map(|(sum, cost)| sum - cost).collect();
+        let mut best = None;
+        for (x, (sum, cost)) in own.iter().zip(of_own).enumerate() {
+            let own_rest = sum - cost;
+            // No strategy of the other one can be good enough.
+            if own_rest + least_other + table.min >= min_cost {
+                continue;
+            }
+            for (y, (rest, cost)) in rest.iter().zip(table.row(x)).enumerate() {
+                let cost = own_rest + (rest + cost);
+                if cost < min_cost {
+                    min_cost = cost;
+                    let partner = Some((other, y));
+                    best = Some(PairMove { gain: now - cost, strategy: x, partner });
+                }
+            }
+        }
+        best
+    }
+
+    /// Makes the moves that save most and do not touch each other, so that what they save adds up.
+    fn make_moves(&mut self, mut offers: Vec<(usize, PairMove)>, neighbors: &[Vec<usize>]) {
+        offers.sort_by(|(i, a), (j, b)| b.gain.total_cmp(&a.gain).then(i.cmp(j)));
+        self.is_changed.fill(false);
+        let mut touched = vec![false; self.joint.len()];
+        for (player, offer) in offers {
+            let moves = [Some((player, offer.strategy)), offer.partner].into_iter().flatten();
+            if moves.clone().any(|(mover, _)| touched[mover]) {
+                continue;
+            }
+            for (mover, strategy) in moves {
+                self.joint[mover] = strategy;
+                self.is_changed[mover] = true;
+                touched[mover] = true;
+                neighbors[mover].iter().for_each(|&neighbor| touched[neighbor] = true);
+            }
         }
     }
 }
@@ -251,6 +359,11 @@ impl PairwiseGame {
         self.player_pairs[player].iter().map(move |&index| self.pairs[index].other(player))
     }
 
+    /// Returns the pair of a player with one of its neighbors, by the place of that among all of them.
+    fn neighbor_pair(&self, player: usize, place: usize) -> &PairCosts {
+        &self.pairs[self.player_pairs[player][place]]
+    }
+
     /// Returns the strategy of a player that costs least without the others; among equals the first.
     fn cheapest_alone(&self, player: usize) -> usize {
         lowest(&self.own[player]).0
@@ -261,63 +374,14 @@ impl PairwiseGame {
         let mut given = self.own[player].clone();
         for &index in &self.player_pairs[player] {
             let pair = &self.pairs[index];
-            let row = pair.given(pair.other(player)).row(joint[pair.other(player)]);
-            given.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost);
+            let other = pair.other(player);
+            let table = pair.given(other);
+            if table.is_nonzero(joint[other]) {
+                let row = table.row(joint[other]);
+                given.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost);
+            }
         }
         PlayerCosts { cost: self.player_cost(joint, player), given }
-    }
-
-    /// Returns the move of a player, or of it and a later neighbor, that saves most; `None` if none does. `players` are
-    /// the costs of all in the joint move.
-    fn best_move(
-        &self,
-        player: usize,
-        joint: &[usize],
-        players: &[PlayerCosts],
-    ) -> Option<PairMove> {
-        let own = &players[player].given;
-        let now = own[joint[player]];
-        let (strategy, cost) = lowest(own);
-        let mut best = PairMove { gain: MIN_SAVED_SHARE * now.abs(), strategy, partner: None };
-        let mut is_found = now - cost > best.gain;
-        if is_found {
-            best.gain = now - cost;
-        }
-        for &index in &self.player_pairs[player] {
-            let pair = &self.pairs[index];
-            let other = pair.other(player);
-            // The pair is that of the earlier player.
-            if other < player {
-                continue;
-            }
-            let others = &players[other].given;
-            let table = pair.given(player);
-            let now = now + others[joint[other]] - table.row(joint[player])[joint[other]];
-            let of_own = pair.given(other).row(joint[other]);
-            let of_other = table.row(joint[player]);
-            let rest: Vec<f64> =
-                others.iter().zip(of_other).map(|(sum, cost)| sum - cost).collect();
-            let min_rest = lowest(&rest).1 + table.min;
-            let min_gain = best.gain.max(MIN_SAVED_SHARE * now.abs());
-            let mut min_cost = now - min_gain;
-            for (x, (sum, cost)) in own.iter().zip(of_own).enumerate() {
-                let own_rest = sum - cost;
-                // No strategy of the other can be good enough.
-                if own_rest + min_rest >= min_cost {
-                    continue;
-                }
-                for (y, (rest, cost)) in rest.iter().zip(table.row(x)).enumerate() {
-                    let cost = own_rest + (rest + cost);
-                    if cost < min_cost {
-                        min_cost = cost;
-                        is_found = true;
-                        best =
-                            PairMove { gain: now - cost, strategy: x, partner: Some((other, y)) };
-                    }
-                }
-            }
-        }
-        is_found.then_some(best)
     }
 
     /// Returns a player's part of a lower bound on the cost of every joint move: the sum of the parts of all players is
@@ -336,9 +400,8 @@ impl PairwiseGame {
             let others: Vec<f64> = self.own[other].iter().map(|cost| other_share * cost).collect();
             let free = lowest(&others).1;
             let table = pair.given(player);
-            let mut nonzero = table.nonzero_rows.iter().peekable();
             for (x, sum) in costs.iter_mut().enumerate() {
-                if nonzero.next_if(|row| **row == x).is_none() {
+                if !table.is_nonzero(x) {
                     *sum += free;
                     continue;
                 }
@@ -356,6 +419,25 @@ impl PairwiseGame {
             (0..players).map(|player| self.neighbors(player).count()).collect();
         (0..players).fold(0.0, |sum, player| sum + self.bound_part(player, &neighbors))
     }
+}
+
+/// Returns the least of `a[x] - b[x]`.
+fn least_difference(a: &[f64], b: &[f64]) -> f64 {
+    // Several minima side by side, each of which waits for no other one.
+    const LANES: usize = 8;
+    let mut least = [f64::INFINITY; LANES];
+    let [a_chunks, b_chunks] = [a, b].map(|costs| costs.chunks_exact(LANES));
+    let tail = a_chunks.remainder().iter().zip(b_chunks.remainder());
+    let tail = tail.fold(f64::INFINITY, |least, (a, b)| least.min(a - b));
+    for (a, b) in a_chunks.zip(b_chunks) {
+        for lane in 0..LANES {
+            let difference = a[lane] - b[lane];
+            if difference < least[lane] {
+                least[lane] = difference;
+            }
+        }
+    }
+    least.into_iter().fold(tail, f64::min)
 }
 
 /// Returns the place of the lowest cost, the first among equals, and that cost.

@@ -56,8 +56,9 @@ pub struct OptimizationStats {
     pub unconverged: u64,
     /// Number of those whose cost is at its lower bound, so that it is the minimum.
     pub proved_minima: u64,
-    /// Number of those of which the true minimum was computed, and of those that have reached it.
+    /// Number of those of which the true minimum was computed.
     pub known_minima: u64,
+    /// Number of those that have reached it.
     pub reached_minima: u64,
     /// Messages on the network, including the shield's exchanges.
     pub traffic: NetworkTraffic,
