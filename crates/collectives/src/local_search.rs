@@ -56,11 +56,24 @@ struct Descent {
     players: Vec<PlayerCosts>,
     /// The least cost that any strategy of each player has beside those of the others.
     least: Vec<f64>,
-    /// Whether each player has moved, or its costs have changed, since the moves of the step before were found.
-    is_changed: Vec<bool>,
-    /// What each player and each of its neighbors can save by moving together, at most; infinite where it is unknown.
-    max_gains: Vec<Vec<f64>>,
+    /// The step in which each player has moved or its costs have changed last.
+    changed_in: Vec<u32>,
+    /// What each player and each of its neighbors can save by moving together.
+    pair_gains: Vec<Vec<PairGain>>,
     is_settled: bool,
+}
+
+/// What two players can save by moving together.
+#[derive(Debug, Clone, Copy)]
+struct PairGain {
+    /// It is not more than this.
+    max: f64,
+    /// The step in which that was found.
+    found_in: u32,
+}
+
+impl PairGain {
+    const UNKNOWN: Self = Self { max: f64::INFINITY, found_in: 0 };
 }
 
 /// The searches from all starts, which take their steps together.
@@ -81,14 +94,14 @@ impl Descents {
     /// cost.
     pub fn new(neighbors: Vec<Vec<usize>>, starts: &[Vec<usize>]) -> Self {
         let count = starts.iter().map(Vec::len).min().unwrap_or(0);
-        let unknown_gains: Vec<Vec<f64>> =
-            neighbors.iter().map(|others| vec![f64::INFINITY; others.len()]).collect();
+        let unknown_gains: Vec<Vec<PairGain>> =
+            neighbors.iter().map(|others| vec![PairGain::UNKNOWN; others.len()]).collect();
         let descents = (0..count).map(|start| Descent {
             joint: starts.iter().map(|strategies| strategies[start]).collect(),
             players: vec![PlayerCosts::default(); starts.len()],
             least: vec![0.0; starts.len()],
-            is_changed: vec![true; starts.len()],
-            max_gains: unknown_gains.clone(),
+            changed_in: vec![0; starts.len()],
+            pair_gains: unknown_gains.clone(),
             is_settled: false,
         });
         Self { descents: descents.collect(), neighbors, steps: 0 }
@@ -111,14 +124,33 @@ impl Descents {
 
     /// Returns the costs of a player in each open descent.
     pub fn player_costs(&self, game: &PairwiseGame, player: usize) -> Vec<PlayerCosts> {
-        self.open().map(|descent| game.player_costs(player, &descent.joint)).collect()
+        let costs = |descent: &Descent| {
+            let mut costs = PlayerCosts::default();
+            game.write_player_costs(player, &descent.joint, &mut costs);
+            costs
+        };
+        self.open().map(costs).collect()
+    }
+
+    /// Computes the costs of a player in each open descent, and sets them; `buffer` may have any content.
+    fn update_player_costs(
+        &mut self,
+        game: &PairwiseGame,
+        player: usize,
+        buffer: &mut PlayerCosts,
+    ) {
+        let step = self.steps;
+        for descent in self.descents.iter_mut().filter(|descent| !descent.is_settled) {
+            game.write_player_costs(player, &descent.joint, buffer);
+            descent.set_player_costs(player, buffer, step);
+        }
     }
 
     /// Sets the costs of a player in each open descent.
     pub fn set_player_costs(&mut self, player: usize, costs: Vec<PlayerCosts>) {
         let open = self.descents.iter_mut().filter(|descent| !descent.is_settled);
-        for (descent, costs) in open.zip(costs) {
-            descent.set_player_costs(player, costs);
+        for (descent, mut costs) in open.zip(costs) {
+            descent.set_player_costs(player, &mut costs, self.steps);
         }
     }
 
@@ -128,7 +160,7 @@ impl Descents {
             let mut given = vec![f64::INFINITY; game.strategies()[player]];
             given[descent.joint[player]] = 0.0;
             let cost = game.player_cost(&descent.joint, player);
-            descent.set_player_costs(player, PlayerCosts { cost, given });
+            descent.set_player_costs(player, &mut PlayerCosts { cost, given }, self.steps);
         }
     }
 
@@ -136,7 +168,8 @@ impl Descents {
     pub fn player_moves(&mut self, game: &PairwiseGame, player: usize) -> Vec<Option<PairMove>> {
         let open = self.descents.iter_mut().filter(|descent| !descent.is_settled);
         let neighbors = &self.neighbors[player];
-        open.map(|descent| descent.best_move(game, player, neighbors)).collect()
+        let step = self.steps;
+        open.map(|descent| descent.best_move(game, player, neighbors, step)).collect()
     }
 
     /// Makes a step by the moves of all players (shape: players, open descents).
@@ -152,7 +185,7 @@ impl Descents {
             // After the last step nobody would learn what its moves cost.
             descent.is_settled = offers.is_empty() || self.steps >= Self::MAX_STEPS;
             if !descent.is_settled {
-                descent.make_moves(offers, &self.neighbors);
+                descent.make_moves(offers, &self.neighbors, self.steps);
             }
         }
         self.settle_duplicates();
@@ -212,43 +245,55 @@ impl Descent {
         self.players.iter().fold(0.0, |sum, player| sum + player.cost)
     }
 
-    fn set_player_costs(&mut self, player: usize, costs: PlayerCosts) {
+    /// Sets the costs of a player, and leaves those before in their place.
+    fn set_player_costs(&mut self, player: usize, costs: &mut PlayerCosts, step: u32) {
         if costs.given != self.players[player].given {
             self.least[player] = lowest(&costs.given).1;
-            self.is_changed[player] = true;
+            self.changed_in[player] = step;
         }
-        self.players[player] = costs;
+        std::mem::swap(&mut self.players[player], costs);
     }
 
-    /// Returns the move of a player, or of it and a later neighbor, that saves most; `None` if none does.
-    /// `neighbors` are those of the player.
+    /// Returns the move of a player that saves most, or else of it and a later neighbor; `None` if none does. `neighbors` are those of the player.
     fn best_move(
         &mut self,
         game: &PairwiseGame,
         player: usize,
         neighbors: &[usize],
+        step: u32,
     ) -> Option<PairMove> {
-        let own = &self.players[player].given;
-        let now = own[self.joint[player]];
-        let gain = now - self.least[player];
-        let mut best = None;
-        if gain > MIN_SAVED_SHARE * now.abs() {
-            best = Some(PairMove { gain, strategy: lowest(own).0, partner: None });
+        if let Some(gain) = self.gain_alone(player) {
+            let strategy = lowest(&self.players[player].given).0;
+            return Some(PairMove { gain, strategy, partner: None });
         }
+        // Moves of two are dear to find, and while single ones change what they would save, they are of no use.
+        if neighbors.iter().any(|&neighbor| self.gain_alone(neighbor).is_some()) {
+            return None;
+        }
+        let mut best: Option<PairMove> = None;
         let first_later = neighbors.partition_point(|&other| other < player);
         for (place, &other) in neighbors.iter().enumerate().skip(first_later) {
             let min_gain = best.map_or(0.0, |best| best.gain);
-            let is_changed = self.is_changed[player] || self.is_changed[other];
-            // Most pairs are as they were in the step before, which did not find enough.
-            if !is_changed && self.max_gains[player][place] <= min_gain {
+            let known = self.pair_gains[player][place];
+            let changed_in = self.changed_in[player].max(self.changed_in[other]);
+            // Most pairs are as they were in an earlier step, which did not find enough.
+            if known.found_in >= changed_in && known.max <= min_gain {
                 continue;
             }
             let pair = game.neighbor_pair(player, place);
             let found = self.best_move_of_two(pair, player, min_gain);
-            self.max_gains[player][place] = found.map_or(min_gain, |found| found.gain);
+            let max = found.map_or(min_gain, |found| found.gain);
+            self.pair_gains[player][place] = PairGain { max, found_in: step };
             best = found.or(best);
         }
         best
+    }
+
+    /// Returns what a player can save alone; `None` if nothing.
+    fn gain_alone(&self, player: usize) -> Option<f64> {
+        let now = self.players[player].given[self.joint[player]];
+        let gain = now - self.least[player];
+        (gain > MIN_SAVED_SHARE * now.abs()).then_some(gain)
     }
 
     /// Returns the move of a player and the other one of a pair that saves most; `None` if none saves more than
@@ -298,9 +343,14 @@ impl Descent {
     }
 
     /// Makes the moves that save most and do not touch each other, so that what they save adds up.
-    fn make_moves(&mut self, mut offers: Vec<(usize, PairMove)>, neighbors: &[Vec<usize>]) {
+    /// `step` is the next step.
+    fn make_moves(
+        &mut self,
+        mut offers: Vec<(usize, PairMove)>,
+        neighbors: &[Vec<usize>],
+        step: u32,
+    ) {
         offers.sort_by(|(i, a), (j, b)| b.gain.total_cmp(&a.gain).then(i.cmp(j)));
-        self.is_changed.fill(false);
         let mut touched = vec![false; self.joint.len()];
         for (player, offer) in offers {
             let moves = [Some((player, offer.strategy)), offer.partner].into_iter().flatten();
@@ -309,7 +359,7 @@ impl Descent {
             }
             for (mover, strategy) in moves {
                 self.joint[mover] = strategy;
-                self.is_changed[mover] = true;
+                self.changed_in[mover] = step;
                 touched[mover] = true;
                 neighbors[mover].iter().for_each(|&neighbor| touched[neighbor] = true);
             }
@@ -340,11 +390,11 @@ pub(super) fn run_descents(game: &PairwiseGame, starts: &[Vec<usize>]) -> Descen
     let players = starts.len();
     let neighbors = (0..players).map(|player| game.neighbors(player).collect()).collect();
     let mut descents = Descents::new(neighbors, starts);
+    let mut buffer = PlayerCosts::default();
     while descents.count_open() > 0 {
         interrupt::check();
         for player in 0..players {
-            let costs = descents.player_costs(game, player);
-            descents.set_player_costs(player, costs);
+            descents.update_player_costs(game, player, &mut buffer);
         }
         let moves: Vec<_> =
             (0..players).map(|player| descents.player_moves(game, player)).collect();
@@ -369,9 +419,11 @@ impl PairwiseGame {
         lowest(&self.own[player]).0
     }
 
-    /// Returns the costs of a player in a joint move.
-    fn player_costs(&self, player: usize, joint: &[usize]) -> PlayerCosts {
-        let mut given = self.own[player].clone();
+    /// Writes the costs of a player in a joint move, in place of what was there.
+    fn write_player_costs(&self, player: usize, joint: &[usize], costs: &mut PlayerCosts) {
+        let PlayerCosts { cost, given } = costs;
+        *cost = self.player_cost(joint, player);
+        given.clone_from(&self.own[player]);
         for &index in &self.player_pairs[player] {
             let pair = &self.pairs[index];
             let other = pair.other(player);
@@ -381,7 +433,6 @@ impl PairwiseGame {
                 given.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost);
             }
         }
-        PlayerCosts { cost: self.player_cost(joint, player), given }
     }
 
     /// Returns a player's part of a lower bound on the cost of every joint move: the sum of the parts of all players is
