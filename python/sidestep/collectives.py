@@ -29,6 +29,8 @@ class MinimizeResult(NamedTuple):
     joint: NDArray[np.int64]
     #: Its cost.
     cost: float
+    #: A lower bound on the cost of every joint strategy; None for an objective.
+    bound: float | None
     #: The final distributions, one array over the strategies of each player.
     q: list[NDArray[np.float64]]
     #: Each player's estimate of the expected cost by strategy, up to a constant: it ranks the strategies.
@@ -57,6 +59,8 @@ def minimize(
     calm_rounds: int = 3,
     max_rounds: int = 500,
     choice: Literal["argmax", "draw"] = "argmax",
+    local_search: Literal["none", "pairs"] | None = None,
+    random_starts: int = 8,
     seed: int = 0,
 ) -> MinimizeResult:
     """Searches for the joint strategy of least cost, with one strategy per player.
@@ -71,7 +75,9 @@ def minimize(
     Brouwer's; ``utility`` is the cost that players learn from, the joint one or, for sums, the part that a player can
     influence. The temperature falls by ``cooling``
     a round, until no probability moves by more than ``threshold`` in ``calm_rounds`` rounds, or after ``max_rounds``. Costs should be
-    of the order of 1. The same arguments and ``seed`` give the same bits.
+    of the order of 1. For sums, a local search follows (``"pairs"``): moves of one or two players while they save anything,
+    from there, from each player's cheapest strategy alone, and from ``random_starts`` joint strategies. The same arguments
+    and ``seed`` give the same bits.
 
     Raises InputError when shapes do not match, or a setting is out of range; and any exception of the objective.
 
@@ -93,6 +99,8 @@ def minimize(
         "calm_rounds": checked_int("calm_rounds", calm_rounds, 1, 1_000_000),
         "max_rounds": checked_int("max_rounds", max_rounds, 1, 1_000_000_000),
         "choice": choice,
+        "local_search": local_search or ("pairs" if is_exact else "none"),
+        "random_starts": checked_int("random_starts", random_starts, 0, 1_000_000),
         "seed": checked_int("seed", seed, 0, 2**64 - 1),
     }
     if objective is not None:
@@ -100,6 +108,8 @@ def minimize(
             raise input_error("objective", "an objective needs numbers of strategies and no tables", "give strategies=")
         if options["estimator"] == "exact":
             raise input_error("estimator", "an objective has no closed form", 'give estimator="sampled"')
+        if options["local_search"] != "none":
+            raise input_error("local_search", "an objective is no sum over pairs", 'give local_search="none"')
         return _native.minimize_objective(list(strategies), objective, options)
     if own is None or strategies is not None:
         raise input_error(

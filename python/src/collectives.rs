@@ -9,8 +9,8 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use sidestep::collectives::{
-    Choice, Estimator, Game, OptimizeResult, OptimizerConfig, PairwiseGame, StopCriterion, Update,
-    UpdateOrder, Utility, optimize,
+    Choice, Estimator, Game, LocalSearch, OptimizeResult, OptimizerConfig, PairwiseGame,
+    StopCriterion, Update, UpdateOrder, Utility, optimize,
 };
 use sidestep::kernel::Seed;
 use sidestep::kernel::interrupt::{self, Interrupt};
@@ -36,6 +36,8 @@ pub(crate) struct MinimizeOptions {
     calm_rounds: u32,
     max_rounds: u32,
     choice: String,
+    local_search: String,
+    random_starts: u32,
     seed: u64,
 }
 
@@ -89,6 +91,12 @@ impl MinimizeOptions {
                 &self.choice,
                 &[("argmax", Choice::Argmax), ("draw", Choice::Draw)],
             )?,
+            local_search: choose(
+                "local_search",
+                &self.local_search,
+                &[("none", LocalSearch::None), ("pairs", LocalSearch::Pairs)],
+            )?,
+            random_starts: self.random_starts,
         })
     }
 
@@ -139,8 +147,7 @@ pub(crate) fn minimize_pairs<'py>(
     let settings = options.settings()?;
     let uniform = options.uniform();
     let outcome = run_interruptible(py, || optimize(&game, &settings, uniform))?;
-    let cost = game.cost(&outcome.joint);
-    minimize_result(py, &outcome, cost)
+    minimize_result(py, &outcome)
 }
 
 /// A game with a cost that Python computes.
@@ -204,25 +211,18 @@ pub(crate) fn minimize_objective<'py>(
     };
     let settings = options.settings()?;
     let uniform = options.uniform();
-    let result = catch_interrupt(&game.interrupt, || {
-        let outcome = optimize(&game, &settings, uniform);
-        let cost = game.cost(&outcome.joint);
-        (outcome, cost)
-    });
+    let result = catch_interrupt(&game.interrupt, || optimize(&game, &settings, uniform));
     let raised = game.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
     raised.map_or(Ok(()), Err)?;
-    let (outcome, cost) = result.ok_or_else(interrupted_error)?;
-    minimize_result(py, &outcome, cost)
+    let outcome = result.ok_or_else(interrupted_error)?;
+    minimize_result(py, &outcome)
 }
 
-fn minimize_result<'py>(
-    py: Python<'py>,
-    outcome: &OptimizeResult,
-    cost: f64,
-) -> PyResult<Bound<'py, PyAny>> {
+fn minimize_result<'py>(py: Python<'py>, outcome: &OptimizeResult) -> PyResult<Bound<'py, PyAny>> {
     Fields::new(py)
         .with("joint", integers(&outcome.joint).to_pyarray(py))?
-        .with("cost", cost)?
+        .with("cost", outcome.cost)?
+        .with("bound", outcome.bound)?
         .with("q", to_arrays(py, &outcome.q)?)?
         .with("expected", to_arrays(py, &outcome.expected)?)?
         .with("rounds", outcome.rounds)?

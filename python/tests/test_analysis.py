@@ -1,6 +1,7 @@
 """Kinematics, learning, statistics and collectives: the command's answers, from arrays to arrays."""
 
 import inspect
+import itertools
 import json
 import pickle
 import re
@@ -262,6 +263,26 @@ def test_no_player_alone_can_do_better_and_an_objective_comes_near():
     assert (again.joint.tolist(), again.rounds) == (sampled.joint.tolist(), sampled.rounds)
     for q in exact.q:
         assert q.sum() == pytest.approx(1.0)
+    assert exact.bound <= exact.cost
+    assert sampled.bound is None
+
+
+def test_no_two_players_can_do_better_after_a_local_search():
+    rng = np.random.default_rng(5)
+    own = [rng.uniform(0, 1, 4) for _ in range(5)]
+    pairs = {(a, b): rng.uniform(0, 1, (4, 4)) for a in range(5) for b in range(a)}
+    rounds = collectives.minimize(own, pairs, cooling=0.3, local_search="none")
+    searched = collectives.minimize(own, pairs, cooling=0.3)
+    assert searched.bound <= searched.cost <= rounds.cost
+
+    def cost(joint):
+        alone = sum(own[k][x] for k, x in enumerate(joint))
+        return alone + sum(table[joint[a], joint[b]] for (a, b), table in pairs.items())
+
+    for (a, b), x, y in itertools.product(pairs, range(4), range(4)):
+        other = searched.joint.copy()
+        other[[a, b]] = x, y
+        assert cost(other) >= searched.cost - 1e-12
 
 
 def test_what_an_objective_raises_is_raised():
@@ -282,6 +303,7 @@ GAME_ERRORS = [
     ({"own": [[1.0]], "update": "slow"}, "`slow` is none of newton or brouwer"),
     ({"objective": len}, "an objective needs numbers of strategies"),
     ({"objective": len, "strategies": [2], "estimator": "exact"}, "has no closed form"),
+    ({"objective": len, "strategies": [2], "local_search": "pairs"}, "is no sum over pairs"),
     ({"strategies": [2]}, "tables need each player's own costs"),
 ]
 
@@ -294,7 +316,7 @@ def test_games_that_are_none_are_errors(options, words):
 
 
 @pytest.mark.parametrize(("name", "kind"), [(name, "ik") for name in ("engine", "body")] + [
-    (name, "minimize") for name in ("estimator", "update", "order", "utility", "choice")
+    (name, "minimize") for name in ("estimator", "update", "order", "utility", "choice", "local_search")
 ])  # fmt: skip
 def test_the_words_of_an_argument_are_those_of_its_type(name, kind, urdf):
     function = {"ik": sidestep.ik, "minimize": collectives.minimize}[kind]

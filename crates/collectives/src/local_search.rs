@@ -56,6 +56,10 @@ struct Descent {
     players: Vec<PlayerCosts>,
     /// The least cost that any strategy of each player has beside those of the others.
     least: Vec<f64>,
+    /// What each player can save alone; none if nothing.
+    gains_alone: Vec<Option<f64>>,
+    /// Whether each player or one of its neighbors has moved in the step before, so that its costs may have changed.
+    touched: Vec<bool>,
     /// The step in which each player has moved or its costs have changed last.
     changed_in: Vec<u32>,
     /// What each player and each of its neighbors can save by moving together.
@@ -100,6 +104,8 @@ impl Descents {
             joint: starts.iter().map(|strategies| strategies[start]).collect(),
             players: vec![PlayerCosts::default(); starts.len()],
             least: vec![0.0; starts.len()],
+            gains_alone: vec![None; starts.len()],
+            touched: vec![true; starts.len()],
             changed_in: vec![0; starts.len()],
             pair_gains: unknown_gains.clone(),
             is_settled: false,
@@ -140,7 +146,8 @@ impl Descents {
         buffer: &mut PlayerCosts,
     ) {
         let step = self.steps;
-        for descent in self.descents.iter_mut().filter(|descent| !descent.is_settled) {
+        let open = self.descents.iter_mut().filter(|descent| !descent.is_settled);
+        for descent in open.filter(|descent| descent.touched[player]) {
             game.write_player_costs(player, &descent.joint, buffer);
             descent.set_player_costs(player, buffer, step);
         }
@@ -252,6 +259,9 @@ impl Descent {
             self.changed_in[player] = step;
         }
         std::mem::swap(&mut self.players[player], costs);
+        let now = self.players[player].given[self.joint[player]];
+        let gain = now - self.least[player];
+        self.gains_alone[player] = (gain > MIN_SAVED_SHARE * now.abs()).then_some(gain);
     }
 
     /// Returns the move of a player that saves most, or else of it and a later neighbor; `None` if none does. `neighbors` are those of the player.
@@ -262,12 +272,12 @@ impl Descent {
         neighbors: &[usize],
         step: u32,
     ) -> Option<PairMove> {
-        if let Some(gain) = self.gain_alone(player) {
+        if let Some(gain) = self.gains_alone[player] {
             let strategy = lowest(&self.players[player].given).0;
             return Some(PairMove { gain, strategy, partner: None });
         }
         // Moves of two are dear to find, and while single ones change what they would save, they are of no use.
-        if neighbors.iter().any(|&neighbor| self.gain_alone(neighbor).is_some()) {
+        if neighbors.iter().any(|&neighbor| self.gains_alone[neighbor].is_some()) {
             return None;
         }
         let mut best: Option<PairMove> = None;
@@ -287,13 +297,6 @@ impl Descent {
             best = found.or(best);
         }
         best
-    }
-
-    /// Returns what a player can save alone; `None` if nothing.
-    fn gain_alone(&self, player: usize) -> Option<f64> {
-        let now = self.players[player].given[self.joint[player]];
-        let gain = now - self.least[player];
-        (gain > MIN_SAVED_SHARE * now.abs()).then_some(gain)
     }
 
     /// Returns the move of a player and the other one of a pair that saves most; `None` if none saves more than
@@ -351,17 +354,19 @@ impl Descent {
         step: u32,
     ) {
         offers.sort_by(|(i, a), (j, b)| b.gain.total_cmp(&a.gain).then(i.cmp(j)));
-        let mut touched = vec![false; self.joint.len()];
+        self.touched.fill(false);
         for (player, offer) in offers {
             let moves = [Some((player, offer.strategy)), offer.partner].into_iter().flatten();
-            if moves.clone().any(|(mover, _)| touched[mover]) {
+            if moves.clone().any(|(mover, _)| self.touched[mover]) {
                 continue;
             }
             for (mover, strategy) in moves {
                 self.joint[mover] = strategy;
                 self.changed_in[mover] = step;
-                touched[mover] = true;
-                neighbors[mover].iter().for_each(|&neighbor| touched[neighbor] = true);
+                self.touched[mover] = true;
+                for &neighbor in &neighbors[mover] {
+                    self.touched[neighbor] = true;
+                }
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Methods of collision avoidance, compared on the same traffic.
 
-use crate::case_results;
+use crate::case_results::{self, TextColumn};
 use crate::study::{Progress, run_all, setting};
 use serde::Serialize;
 use sidestep::experiment::sweep::plan::check_seeds;
@@ -45,6 +45,21 @@ pub struct MethodResult {
     pub bytes: Estimate,
     /// Decisions that the shield changed, per run.
     pub shield_overrides: Estimate,
+    /// The same traffic without the shield; absent where the scenario has none.
+    pub bare: Option<BareResult>,
+}
+
+/// Results of a method without the shield, beside those with it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BareResult {
+    /// Runs without any loss of separation.
+    pub loss_free: usize,
+    /// Losses of separation per run.
+    pub losses: Estimate,
+    /// Mean time beyond that of the flight alone, in percent of it.
+    pub delay_percent: Estimate,
+    /// The price of the shield: the mean over runs of the delay with it less that without it, in percent.
+    pub price_percent: Estimate,
 }
 
 /// The runs of each method, by seeds that follow one another.
@@ -88,12 +103,30 @@ impl Comparison<'_> {
             let source = self.source.clone().with_overrides(&overrides)?;
             let runs =
                 MethodRuns { source: &source, workers: self.workers, interrupt: &self.interrupt };
-            let report = |share| progress(method.name(), share);
-            let (effect, metrics) = runs.run_seeds(self.seeds, report)?;
-            results.push(method_result(method.name(), effect, &metrics));
+            let (effect, metrics) =
+                runs.run_seeds(self.seeds, |share| progress(method.name(), share))?;
+            let bare = match bare_source(&source)? {
+                Some(bare) => {
+                    let runs = MethodRuns { source: &bare, ..runs };
+                    let name = format!("{} without the shield", method.name());
+                    Some(runs.run_seeds(self.seeds, |share| progress(&name, share))?.1)
+                }
+                None => None,
+            };
+            let mut result = method_result(method.name(), effect, &metrics);
+            result.bare = bare.map(|bare| bare_result(&metrics, &bare));
+            results.push(result);
         }
         Ok(results)
     }
+}
+
+/// Returns a scenario without its shield; `None` if it has none.
+fn bare_source(source: &Source) -> Result<Option<Source>, InputError> {
+    if !CompiledAirspace::new(source)?.world.shield {
+        return Ok(None);
+    }
+    source.clone().with_overrides(&[setting("airspace.shield", "off").to_override()]).map(Some)
 }
 
 /// The runs of a scenario with several seeds.
@@ -179,14 +212,33 @@ fn method_result(method: &'static str, seeds: SeedEffect, all: &[Metrics]) -> Me
         messages: mean(all, |m| Some(m.messages as f64)),
         bytes: mean(all, |m| Some(m.bytes as f64)),
         shield_overrides: mean(all, |m| Some(m.shield_overrides as f64)),
+        bare: None,
+    }
+}
+
+/// Returns the results of runs without the shield beside those with it.
+fn bare_result(shielded: &[Metrics], bare: &[Metrics]) -> BareResult {
+    let pairs = shielded.iter().zip(bare);
+    let prices = pairs.map(|(on, off)| Some(on.mean_delay_percent? - off.mean_delay_percent?));
+    BareResult {
+        loss_free: bare.iter().filter(|m| m.losses_of_separation == 0).count(),
+        losses: mean(bare, |m| Some(m.losses_of_separation as f64)),
+        delay_percent: mean(bare, |m| m.mean_delay_percent),
+        price_percent: mean_of(prices),
     }
 }
 
 /// Returns the mean over all runs. Where they are equal it has no interval: one without width would claim that no other
 /// run is different.
 fn mean(all: &[Metrics], value: fn(&Metrics) -> Option<f64>) -> Estimate {
-    let mut estimate = Estimate::from_values(all.iter().map(value));
-    let values: Vec<f64> = all.iter().filter_map(value).collect();
+    mean_of(all.iter().map(value))
+}
+
+/// The same of values that are known already.
+fn mean_of(values: impl Iterator<Item = Option<f64>>) -> Estimate {
+    let all: Vec<Option<f64>> = values.collect();
+    let mut estimate = Estimate::from_values(all.iter().copied());
+    let values: Vec<f64> = all.into_iter().flatten().collect();
     if is_tied(&values) {
         estimate.interval = None;
     }
@@ -195,25 +247,39 @@ fn mean(all: &[Metrics], value: fn(&Metrics) -> Option<f64>) -> Estimate {
 
 /// Returns a table of the results side by side.
 pub fn table(title: &str, results: &[MethodResult]) -> Table {
-    case_results::table(
-        title,
-        table_note(results),
-        results,
-        &[
-            ("method", &|r| r.method.to_string()),
-            ("runs without loss", &|r| format_loss_free(r)),
-            ("losses", &|r| format_mean(r, &r.losses)),
-            ("nearest of all runs, m", &|r| {
-                r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}"))
-            }),
-            ("arrived", &|r| format_mean(r, &r.arrived)),
-            ("delay, %", &|r| format_mean(r, &r.delay_percent)),
-            ("deciding, s", &|r| format_mean(r, &r.optimize_cpu_s)),
-            ("messages", &|r| format_mean(r, &r.messages)),
-            ("bytes", &|r| format_mean(r, &r.bytes)),
+    let mut columns: Vec<TextColumn<'_, &MethodResult>> = vec![
+        ("method", &|r| r.method.to_string()),
+        ("runs without loss", &|r| format_loss_free(r)),
+        ("losses", &|r| format_mean(r, &r.losses)),
+        ("nearest of all runs, m", &|r| {
+            r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}"))
+        }),
+        ("arrived", &|r| format_mean(r, &r.arrived)),
+        ("delay, %", &|r| format_mean(r, &r.delay_percent)),
+        ("deciding, s", &|r| format_mean(r, &r.optimize_cpu_s)),
+        ("messages", &|r| format_mean(r, &r.messages)),
+        ("bytes", &|r| format_mean(r, &r.bytes)),
+    ];
+    if results.iter().any(|result| result.bare.is_some()) {
+        let bare: [TextColumn<'_, &MethodResult>; 5] = [
             ("changed by the shield", &|r| format_mean(r, &r.shield_overrides)),
-        ],
-    )
+            ("bare: runs without loss", &|r| {
+                format_bare(r, |bare| format!("{}/{}", bare.loss_free, r.runs))
+            }),
+            ("bare: losses", &|r| format_bare(r, |bare| format_mean(r, &bare.losses))),
+            ("bare: delay, %", &|r| format_bare(r, |bare| format_mean(r, &bare.delay_percent))),
+            ("delay by the shield, %", &|r| {
+                format_bare(r, |bare| format_mean(r, &bare.price_percent))
+            }),
+        ];
+        columns.extend(bare);
+    }
+    case_results::table(title, table_note(results), results, &columns)
+}
+
+/// Returns a result without the shield; a dash where there is none.
+fn format_bare(result: &MethodResult, format: impl Fn(&BareResult) -> String) -> String {
+    result.bare.as_ref().map_or_else(|| "-".into(), format)
 }
 
 fn format_loss_free(result: &MethodResult) -> String {
@@ -234,11 +300,11 @@ fn format_mean(result: &MethodResult, estimate: &Estimate) -> String {
 
 /// Returns the sentence without which the actions of the shield would pass for those of a method.
 fn shield_note(results: &[MethodResult]) -> Option<String> {
-    let names = method_names(results, |r| r.shield_overrides.mean.is_some_and(|mean| mean > 0.0))?;
-    Some(format!(
-        "The shield changed commands of {names}: there it is the shield that keeps airplanes apart, in part \
-         or in whole. Fly the methods bare with --set airspace.shield=off."
-    ))
+    results.iter().any(|result| result.bare.is_some()).then(|| {
+        "Columns with \"bare\" are of the same traffic without the shield, by the method alone; \"delay by the shield\" is \
+         the difference, run by run."
+            .into()
+    })
 }
 
 /// Returns the names of the methods for which this holds, if there are any.
@@ -332,8 +398,16 @@ mod tests {
                     [airspace.generator]\nkind = \"superconflict\"\nn = 4\n";
         let source = Source::new("four", text, "");
         let results = compare(&source, &[BuiltInMethod::None], 2);
-        assert_eq!(results[0].loss_free, 2);
-        let note = table("t", &results).note;
-        assert!(note.contains("The shield changed commands of none:"), "{note}");
+        let bare = results[0].bare.as_ref().expect("a shield to do without");
+        assert_eq!((results[0].loss_free, bare.loss_free), (2, 0));
+        assert_eq!(bare.delay_percent.mean, Some(0.0), "without it they fly straight on");
+        assert_eq!(bare.price_percent.mean, results[0].delay_percent.mean);
+        let table = table("t", &results);
+        let cell = |head: &str| {
+            let column = table.heads.iter().position(|h| h == head).expect("a column");
+            table.rows[0][column].clone()
+        };
+        assert_eq!(cell("bare: runs without loss"), "0/2");
+        assert!(table.note.contains("without the shield"), "{}", table.note);
     }
 }

@@ -170,7 +170,7 @@ impl Compiler<'_> {
             update: self.update_rule()?.unwrap_or(Update::NearestNewton { step: 0.5 }),
             order: section.order.unwrap_or(order),
             utility: self.utility(estimator)?,
-            cooling: section.cooling.map_or(if is_paper { 0.8 } else { 0.3 }, f64::from),
+            cooling: section.cooling.map_or(if is_paper { 0.8 } else { 0.5 }, f64::from),
             stop: StopCriterion {
                 threshold: 1e-3,
                 calm_rounds: 3,
