@@ -182,13 +182,12 @@ impl Descents {
     /// Makes a step by the moves of all players (shape: players, open descents).
     pub fn step(&mut self, moves: &[Vec<Option<PairMove>>]) {
         self.steps += 1;
-        let mut open = 0;
-        for descent in self.descents.iter_mut().filter(|descent| !descent.is_settled) {
+        let open_descents = self.descents.iter_mut().filter(|descent| !descent.is_settled);
+        for (open, descent) in open_descents.enumerate() {
             let mut offers: Vec<(usize, PairMove)> = Vec::new();
             for (player, moves) in moves.iter().enumerate() {
                 offers.extend(moves.get(open).copied().flatten().map(|offer| (player, offer)));
             }
-            open += 1;
             // After the last step nobody would learn what its moves cost.
             descent.is_settled = offers.is_empty() || self.steps >= Self::MAX_STEPS;
             if !descent.is_settled {

@@ -250,29 +250,26 @@ pub fn table(title: &str, results: &[MethodResult]) -> Table {
     let mut columns: Vec<TextColumn<'_, &MethodResult>> = vec![
         ("method", &|r| r.method.to_string()),
         ("runs without loss", &|r| format_loss_free(r)),
+        ("bare: runs without loss", &|r| {
+            format_bare(r, |bare| format!("{}/{}", bare.loss_free, r.runs))
+        }),
         ("losses", &|r| format_mean(r, &r.losses)),
+        ("bare: losses", &|r| format_bare(r, |bare| format_mean(r, &bare.losses))),
+        ("delay, %", &|r| format_mean(r, &r.delay_percent)),
+        ("bare: delay, %", &|r| format_bare(r, |bare| format_mean(r, &bare.delay_percent))),
+        ("by the shield, %", &|r| format_bare(r, |bare| format_mean(r, &bare.price_percent))),
+        ("changed by the shield", &|r| format_mean(r, &r.shield_overrides)),
         ("nearest of all runs, m", &|r| {
             r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}"))
         }),
         ("arrived", &|r| format_mean(r, &r.arrived)),
-        ("delay, %", &|r| format_mean(r, &r.delay_percent)),
         ("deciding, s", &|r| format_mean(r, &r.optimize_cpu_s)),
         ("messages", &|r| format_mean(r, &r.messages)),
         ("bytes", &|r| format_mean(r, &r.bytes)),
     ];
-    if results.iter().any(|result| result.bare.is_some()) {
-        let bare: [TextColumn<'_, &MethodResult>; 5] = [
-            ("changed by the shield", &|r| format_mean(r, &r.shield_overrides)),
-            ("bare: runs without loss", &|r| {
-                format_bare(r, |bare| format!("{}/{}", bare.loss_free, r.runs))
-            }),
-            ("bare: losses", &|r| format_bare(r, |bare| format_mean(r, &bare.losses))),
-            ("bare: delay, %", &|r| format_bare(r, |bare| format_mean(r, &bare.delay_percent))),
-            ("delay by the shield, %", &|r| {
-                format_bare(r, |bare| format_mean(r, &bare.price_percent))
-            }),
-        ];
-        columns.extend(bare);
+    // Without a shield all runs are bare.
+    if results.iter().all(|result| result.bare.is_none()) {
+        columns.retain(|(head, _)| !head.starts_with("bare: ") && !head.contains("by the shield"));
     }
     case_results::table(title, table_note(results), results, &columns)
 }
@@ -301,8 +298,8 @@ fn format_mean(result: &MethodResult, estimate: &Estimate) -> String {
 /// Returns the sentence without which the actions of the shield would pass for those of a method.
 fn shield_note(results: &[MethodResult]) -> Option<String> {
     results.iter().any(|result| result.bare.is_some()).then(|| {
-        "Columns with \"bare\" are of the same traffic without the shield, by the method alone; \"delay by the shield\" is \
-         the difference, run by run."
+        "Columns with \"bare\" are of the same traffic without the shield, by the method alone; what the shield adds to the \
+         delay is the mean difference, run by run."
             .into()
     })
 }
@@ -404,7 +401,7 @@ mod tests {
         assert_eq!(bare.price_percent.mean, results[0].delay_percent.mean);
         let table = table("t", &results);
         let cell = |head: &str| {
-            let column = table.heads.iter().position(|h| h == head).expect("a column");
+            let column = table.columns.iter().position(|h| h == head).expect("a column");
             table.rows[0][column].clone()
         };
         assert_eq!(cell("bare: runs without loss"), "0/2");
