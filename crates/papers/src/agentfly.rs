@@ -20,6 +20,7 @@ use crate::claims::{
     judge_thresholds,
 };
 use crate::study::{Progress, Study, downcast, run_to_end, setting, setting_number, source};
+use crate::trial_file::TrialFile;
 use serde::Serialize;
 use sidestep::kernel::{InputError, Simulation};
 use sidestep::statistics::least_squares::Fit;
@@ -139,6 +140,7 @@ const COLUMNS: Columns = Columns {
         column("rounds", "rounds", Summary::Mean("rounds_mean")),
         column("losses", "losses", Summary::Mean("losses_of_separation")),
         column("delay_percent", "delay, %", Summary::Mean("mean_delay_percent")),
+        column("in_flight", "", Summary::Mean("in_flight")),
         column("by_seed", "", Summary::Computed(by_seed)),
     ],
 };
@@ -163,7 +165,7 @@ fn by_seed(case: &CaseRuns<'_>) -> Value {
 fn numbers_of_run(case: &CaseRuns<'_>, run: &CaseRun<'_>) -> NamedNumbers {
     let cost = optimization_cost(case, run);
     let mut numbers = vec![("elapsed_s", cost.elapsed_s(LINK_BIT_S))];
-    for metric in ["messages", "bytes", "multicast_bytes"] {
+    for metric in ["messages", "bytes", "multicast_bytes", "rounds_mean"] {
         numbers.push((metric, run.number_or_zero(metric)));
     }
     for (name, link_bit_s) in TIME_BY_LINK.into_iter().zip(COMPARED_LINKS_BIT_S) {
@@ -225,18 +227,19 @@ fn optimization_cost(case: &CaseRuns<'_>, run: &CaseRun<'_>) -> OptimizationCost
     }
 }
 
-/// Runs the experiments.
+/// Runs the experiments, except for trials that are kept.
 ///
 /// # Errors
 /// When the plan asks for an impossible scenario.
 pub fn run(
     plan: &AgentflyConfig,
+    kept: &TrialFile,
     progress: &mut Progress<'_>,
 ) -> Result<AgentflyReport, InputError> {
     let study = Study::from_file(SWEEP, SCENARIO)?.with_size(plan.seeds, Some(plan.cycles));
     let study =
         study.filtered(|v| plan.airplanes.contains(&(setting_number(v, AIRPLANES) as usize)));
-    let cases = COLUMNS.cases(&study.run(plan.workers, "super-conflicts", progress)?);
+    let cases = COLUMNS.cases(&study.run(plan.workers, "super-conflicts", kept, progress)?);
     let claims = judge(&cases);
     let largest = plan.airplanes.iter().copied().max().unwrap_or(0);
     let tracks_m = tracks_m(plan, largest)?;
@@ -376,6 +379,8 @@ fn judge(cases: &[CaseResults]) -> Vec<Claim> {
         judge_byte_growth(cases, "A-4b", "multicast_bytes"),
         judge_multicast(cases),
         judge_in_time(cases),
+        judge_dip(cases, "A-8a", "elapsed_s"),
+        judge_dip(cases, "A-8b", "rounds_mean"),
     ]
 }
 
@@ -460,6 +465,37 @@ fn judge_in_time(cases: &[CaseResults]) -> Claim {
     claim("A-6", judge_all_above(&times_s, DT_S), ours)
 }
 
+/// Numbers of airplanes at which the paper's times dip, and the number before them.
+const DIP_AIRPLANES: [u64; 2] = [5, 6];
+const BEFORE_DIP_AIRPLANES: u64 = 4;
+
+/// Judges whether a quantity is smaller in the dip than before it, with both deployments.
+fn judge_dip(cases: &[CaseResults], id: &str, name: &'static str) -> Claim {
+    let mut ratios = Vec::new();
+    let mut texts = Vec::new();
+    for deployment in COMPARED_DEPLOYMENTS {
+        let metric_at = |airplanes: u64| {
+            let mut of_deployment = cases.iter().filter(|c| c.has_text("deployment", deployment));
+            let of = of_deployment.find(|case| case.count("airplanes") == airplanes)?;
+            Some(CaseMetric { of, name })
+        };
+        for airplanes in DIP_AIRPLANES {
+            if let (Some(dip), Some(before)) =
+                (metric_at(airplanes), metric_at(BEFORE_DIP_AIRPLANES))
+            {
+                let dip_ratio = ratio([dip, before]);
+                texts.push(format!("{deployment}, {airplanes} airplanes: {dip_ratio}"));
+                ratios.push(dip_ratio);
+            }
+        }
+    }
+    let threshold = CLAIMS.threshold(id);
+    let tests = ratios.iter().map(|ratio| ThresholdTest::below(ratio, threshold));
+    let ours = join_texts(texts, |text| text);
+    let verdict = judge_thresholds(tests);
+    claim(id, verdict, format!("over {BEFORE_DIP_AIRPLANES} airplanes: {ours}"))
+}
+
 impl AgentflyReport {
     /// Returns the report with the measurements over real sockets.
     #[must_use]
@@ -476,12 +512,32 @@ impl AgentflyReport {
         let flights: Vec<Series> = tracks.map(|(id, track_m)| flight(id, track_m)).collect();
         let flights = figure(&title, ["east, km", "north, km"], flights);
         let time_title = "Time of all optimizations, with transmission";
+        let span = self.flight_span();
         vec![
-            Figure { kind: FigureKind::Ways, note: TRACK_NOTE.into(), ..flights },
+            Figure { kind: FigureKind::Ways, note: self.track_note(), ..flights },
             self.figure_by_airplanes(time_title, "seconds", "elapsed_s"),
-            self.figure_by_airplanes("Messages of a whole flight", "messages", "messages"),
-            self.figure_by_airplanes("Bytes of a whole flight", "bytes", "bytes"),
+            self.figure_by_airplanes(&format!("Messages of {span}"), "messages", "messages"),
+            self.figure_by_airplanes(&format!("Bytes of {span}"), "bytes", "bytes"),
         ]
+    }
+
+    /// Returns whether all airplanes of all runs have arrived; in a rehearsal the cycles end before.
+    fn are_flights_whole(&self) -> bool {
+        self.cases.iter().all(|case| case.number("in_flight") == 0.0)
+    }
+
+    /// Returns the words for what sums are over.
+    fn flight_span(&self) -> String {
+        if self.are_flights_whole() {
+            "a whole flight".into()
+        } else {
+            format!("the first {:.0} s of a flight", self.plan.cycles as f64 * DT_S)
+        }
+    }
+
+    fn track_note(&self) -> String {
+        let end = if self.are_flights_whole() { "it arrives" } else { "it is at the end" };
+        format!("A ring is where an airplane starts, an arrowhead where {end}.")
     }
 
     /// Returns a figure of column `y` over the number of airplanes.
@@ -496,9 +552,10 @@ impl AgentflyReport {
     /// One row for each case, with all its numbers.
     fn table(&self) -> Table {
         let note = format!(
-            "Per run, with 95 % intervals. Deciding is measured, as if every agent had a processor of \
+            "Per run of {}, with 95 % intervals. Deciding is measured, as if every agent had a processor of \
              its own. Time adds transmission, which follows from the messages and bytes counted: one \
              transmitter of {:.0} Mbit/s for each airplane, and {} ms from sender to receiver.",
+            self.flight_span(),
             1e-6 * LINK_BIT_S,
             1e3 * LATENCY_S
         );
@@ -542,15 +599,13 @@ impl AgentflyReport {
             format!("sidestep reproduce agentfly{quick} --seeds {} --out DIR", plan.seeds);
         let mut results = vec![(self.figures(), vec![self.table(), self.link_table()])];
         if let Some(sockets) = &self.sockets {
-            results.push((Vec::new(), vec![sockets.table()]));
+            results.push((Vec::new(), vec![sockets.table(&plan.sockets)]));
         }
         let experiments = CLAIMS.experiments(results);
         let parts = ReportParts { claims: &self.claims, pictures: Vec::new(), experiments };
         CLAIMS.document(lead, plan.quick, parts, command)
     }
 }
-
-const TRACK_NOTE: &str = "A ring is where an airplane starts, an arrowhead where it arrives.";
 
 fn flight(id: u32, track_m: &[AirPoint]) -> Series {
     let points_km = track_m.iter().map(|at| Point::new(at[0] / 1000.0, at[1] / 1000.0));
@@ -566,8 +621,8 @@ mod tests {
     fn a_rehearsal_judges_every_claim() {
         // Up to the first cycles in which they must avoid each other.
         let short = AgentflyConfig { seeds: 1, cycles: 16, ..AgentflyConfig::quick() };
-        let report = run(&short, &mut |_, _| ()).expect("a valid plan");
-        assert_eq!((report.cases.len(), report.claims.len()), (6, 8));
+        let report = run(&short, &TrialFile::none(), &mut |_, _| ()).expect("a valid plan");
+        assert_eq!((report.cases.len(), report.claims.len()), (6, 10));
         assert!(report.cases.iter().all(|case| case.number("messages") > 0.0), "all have talked");
         assert!(report.claims.iter().all(|claim| claim.verdict == Verdict::Undecided), "one run");
         let document = report.document();
@@ -575,11 +630,17 @@ mod tests {
         let figures = document.blocks.iter().filter(|block| matches!(block, Block::Figure(_)));
         assert_eq!(figures.count(), 4);
         assert_eq!(report.figures()[0].series.len(), 5);
+        // Nobody has arrived, so that no caption speaks of a whole flight.
+        let titles: Vec<String> = report.figures().into_iter().map(|figure| figure.title).collect();
+        assert_eq!(titles[2], "Messages of the first 80 s of a flight");
+        assert!(!report.figures()[0].note.contains("arrives"), "{titles:?}");
+        assert!(report.table().note.contains("the first 80 s"), "{}", report.table().note);
     }
 
     /// Numbers of one deployment with some airplanes.
     struct Numbers {
         elapsed_s: f64,
+        rounds: f64,
         optimization_s: f64,
         messages: f64,
         bytes: f64,
@@ -596,6 +657,7 @@ mod tests {
         let of_run = |seed: usize| {
             [
                 ("elapsed_s", of.elapsed_s),
+                ("rounds_mean", of.rounds),
                 ("messages", of.messages),
                 ("bytes", of.bytes),
                 ("multicast_bytes", of.multicast_bytes),
@@ -617,8 +679,11 @@ mod tests {
     fn paper(is_right: bool, airplanes: u64) -> [CaseResults; 2] {
         let n = airplanes as f64;
         let multicast_bytes = if is_right { n } else { n * n };
+        let dip = if is_right && DIP_AIRPLANES.contains(&airplanes) { 0.5 } else { 1.0 };
+        let growth = dip * n;
         let team = Numbers {
-            elapsed_s: 1.0,
+            elapsed_s: growth,
+            rounds: growth,
             optimization_s: 0.1,
             messages: n * n,
             bytes: n * n,
@@ -626,14 +691,20 @@ mod tests {
         };
         let pim = if is_right {
             Numbers {
-                elapsed_s: 2.0,
+                elapsed_s: 2.0 * growth,
                 optimization_s: 6.0,
                 messages: n,
                 bytes: 9.0 * n * n * n,
                 ..team
             }
         } else {
-            Numbers { elapsed_s: 0.5, optimization_s: 4.0, messages: 2.0 * n * n, bytes: n, ..team }
+            Numbers {
+                elapsed_s: 0.5 * growth,
+                optimization_s: 4.0,
+                messages: 2.0 * n * n,
+                bytes: n,
+                ..team
+            }
         };
         [
             results(airplanes, COMPARED_DEPLOYMENTS[0], &team),
@@ -647,28 +718,29 @@ mod tests {
 
     #[test]
     fn every_claim_can_be_held_and_can_be_refuted_by_the_runs_of_a_full_plan() {
-        let all = |is_right| verdicts(&[3, 5, 10].map(|n| paper(is_right, n)));
-        assert_eq!(all(true), [Verdict::Held; 8]);
-        assert_eq!(all(false), [Verdict::Refuted; 8]);
+        let all = |is_right| verdicts(&[3, 4, 5, 6, 10].map(|n| paper(is_right, n)));
+        assert_eq!(all(true), [Verdict::Held; 10]);
+        assert_eq!(all(false), [Verdict::Refuted; 10]);
     }
 
     #[test]
     fn what_is_not_there_decides_nothing() {
         let nobody = Numbers {
             elapsed_s: 0.0,
+            rounds: f64::NAN,
             optimization_s: f64::NAN,
             messages: 0.0,
             bytes: 0.0,
             multicast_bytes: 0.0,
         };
         let silent = |n| COMPARED_DEPLOYMENTS.map(|deployment| results(n, deployment, &nobody));
-        assert_eq!(verdicts(&[silent(5), silent(6)]), [Verdict::Undecided; 8]);
+        assert_eq!(verdicts(&[silent(5), silent(6)]), [Verdict::Undecided; 10]);
         // Numbers of airplanes that never met are left out of all ratios; one number shows no growth.
         let some = judge(&[silent(2), paper(true, 5)].concat());
         assert_eq!(some[0].ours, "pim / team: 2.00 [2.00, 2.00] n=20");
         let undecided = |claim: &&Claim| claim.verdict == Verdict::Undecided;
         let ids: Vec<&str> = some.iter().filter(undecided).map(|claim| claim.id).collect();
-        assert_eq!(ids, ["A-4a", "A-4b", "A-5"]);
+        assert_eq!(ids, ["A-4a", "A-4b", "A-5", "A-8a", "A-8b"]);
     }
 
     #[test]

@@ -10,12 +10,13 @@
 //! scene.rs         the content of a picture
 //! case_results.rs  the table of runs -> results of every case: as JSON, a table, points of figures
 //! claims.rs        verdicts over results
+//! trial_file.rs    the trials that have ended, for experiments that go on after an interrupt
 //! ```
 //!
 //! Beside the sources stand the data: `scenarios/` with scenarios and sweeps, `claims/` with the claims of each paper, the rules
 //! by which they are judged, and the numbers with which rules compare. Each experiment has one constant table of its columns.
 //!
-//! Nothing here draws a figure or writes a file: results are data, reports are documents.
+//! Nothing here draws a figure or writes a report: results are data, reports are documents.
 
 pub mod agentfly;
 mod case_results;
@@ -28,5 +29,8 @@ mod scene;
 pub mod serpentine;
 mod study;
 
+mod trial_file;
+
 pub use scene::Scene;
 pub use study::Progress;
+pub use trial_file::{TrialFile, TrialFileError, TrialFileHead};

@@ -4,6 +4,7 @@
 //! `sidestep run` accept unchanged. A plan keeps only some of a sweep's variants, or runs it
 //! longer.
 
+use crate::trial_file::TrialFile;
 use serde_json::{Map, Value};
 use sidestep::experiment::sweep::scheduler::run_trials;
 use sidestep::experiment::sweep::{
@@ -126,7 +127,7 @@ impl Study {
         self.variants.len()
     }
 
-    /// Runs every variant to its end; the metrics are those of its world.
+    /// Runs every variant to its end, except for trials that are kept; the metrics are those of its world.
     ///
     /// # Errors
     /// When a scenario is wrong.
@@ -134,11 +135,14 @@ impl Study {
         &self,
         workers: usize,
         what: &str,
+        kept: &TrialFile,
         progress: &mut Progress<'_>,
     ) -> Result<StudyResults, InputError> {
         let mut results = self.run_by(workers, what, progress, |scenario, _, trial| {
-            let run = start_trial(&WORLDS, *trial, &scenario()?, 1)?;
-            Ok(run.run(&|| true).expect("nobody stops it"))
+            kept.result(&format!("{what}, trial {}", trial.id), || {
+                let run = start_trial(&WORLDS, *trial, &scenario()?, 1)?;
+                Ok(run.run(&|| true).expect("nobody stops it"))
+            })
         })?;
         for variant in &mut results.variants {
             let compiled = WORLDS.compile(&self.scenario_with(&variant.settings)?)?;

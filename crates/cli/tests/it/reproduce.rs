@@ -97,6 +97,30 @@ fn a_rehearsal_of_the_airspace_experiments_measures_over_sockets_or_says_how_to(
 }
 
 #[test]
+fn interrupted_experiments_go_on_and_other_ones_do_not_take_their_place() {
+    let place = TestFolder::new();
+    let command = ["reproduce", "mapf", "--quick", "--seeds", "2", "--out", "m"];
+    let trials = || std::fs::read_to_string(place.path("m/trials.jsonl")).unwrap_or_default();
+    let child = place.start(&command);
+    // The first line says which experiments they are.
+    wait_for("a trial", || trials().lines().count() > 1);
+    signal(&child, "INT");
+    let ended = CommandOutput(child.wait_with_output().expect("ended"));
+    assert_eq!((ended.code(), ended.out().as_str()), (130, ""));
+    assert!(ended.err().contains("the same command goes on"), "{}", ended.err());
+    assert_eq!(names(&place.path("m")), ["trials.jsonl"]);
+    let kept = trials();
+    let other = place.run(&["reproduce", "mapf", "--quick", "--seeds", "1", "--out", "m"]);
+    assert_eq!(other.code(), 2, "{}", other.err());
+    assert!(other.err().contains("the beginning of other experiments"), "{}", other.err());
+    assert_eq!(trials(), kept);
+    let whole = place.run(&command);
+    assert_eq!(whole.code(), 0, "{}", whole.err());
+    assert!(whole.err().contains("Goes on after"), "{}", whole.err());
+    assert_eq!(names(&place.path("m")), WHOLE);
+}
+
+#[test]
 fn a_rehearsal_of_the_study_of_planners_leaves_a_whole_report() {
     let place = TestFolder::new();
     let told = place.json(&["reproduce", "mapf", "--quick", "--seeds", "1", "--out", "m"]);

@@ -5,9 +5,13 @@
 //! a clock from when all nodes have joined to the end of the flight, so it depends on the machine and on other load
 //! on it.
 
-use super::{AIRPLANES, AgentflyConfig, CLAIMS, SCENARIO, claim, join_estimates, judge_all_above};
+use super::{
+    AIRPLANES, AgentflyConfig, CLAIMS, SCENARIO, SocketsConfig, claim, join_estimates,
+    judge_all_above,
+};
 use crate::study::{Progress, run_to_end, setting, source};
-use serde::Serialize;
+use crate::trial_file::TrialFile;
+use serde::{Deserialize, Serialize};
 use sidestep::kernel::InputError;
 use sidestep::worlds::airspace::airspace_run;
 use sidestep_document::claim::Claim;
@@ -18,7 +22,7 @@ use std::time::Instant;
 const DEPLOYMENTS: [&str; 4] = ["team", "compact-team", "pim", "hierarchical-pim"];
 
 /// The effort of a whole flight, in one process or over sockets.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct FlightMeasurement {
     /// Seconds by a clock.
     pub elapsed_s: f64,
@@ -57,12 +61,13 @@ pub struct SocketCase {
     pub over_sockets: Vec<FlightMeasurement>,
 }
 
-/// Measures the flights of a plan in one process, and by `run_fleet`.
+/// Measures the flights of a plan in one process, and by `run_fleet`, except for those that are kept.
 ///
 /// # Errors
 /// When the plan asks for an impossible scenario, and those of `run_fleet`.
 pub fn measure<E: From<InputError>>(
     plan: &AgentflyConfig,
+    kept: &TrialFile,
     run_fleet: &mut FleetRunner<'_, E>,
     progress: &mut Progress<'_>,
 ) -> Result<SocketMeasurements, E> {
@@ -83,8 +88,12 @@ pub fn measure<E: From<InputError>>(
                 setting("cycles", plan.sockets.cycles as i64),
             ];
             let text = source(SCENARIO, &settings)?.text;
-            alone.push(measure_in_one_process(&text)?);
-            over_sockets.push(run_fleet(&text)?);
+            let name = format!("{airplanes} airplanes, {deployment}, seed {seed}");
+            let [one, fleet] = kept.result(&name, || -> Result<_, E> {
+                Ok([measure_in_one_process(&text)?, run_fleet(&text)?])
+            })?;
+            alone.push(one);
+            over_sockets.push(fleet);
         }
         cases.push(SocketCase { airplanes, deployment, alone, over_sockets });
     }
@@ -137,10 +146,6 @@ impl SocketCase {
     }
 }
 
-const MEASURED_NOTE: &str = "Per run, with 95 % intervals: in one process, and with a process for each airplane, which \
-     talk over sockets of the loopback, in lockstep. Time is that of a clock, from when all have \
-     joined to the end; bytes are those of packets, without what the network below adds.";
-
 impl SocketMeasurements {
     /// Returns the claim about time, judged by the measurements; none without any.
     pub(super) fn claim(&self) -> Option<Claim> {
@@ -159,9 +164,14 @@ impl SocketMeasurements {
     }
 
     /// One row for each case; without measurements the note has the reason.
-    pub(super) fn table(&self) -> Table {
+    pub(super) fn table(&self, plan: &SocketsConfig) -> Table {
         let note = match self {
-            Self::Measured(_) => MEASURED_NOTE.into(),
+            Self::Measured(_) => format!(
+                "Per run of up to {} cycles, with 95 % intervals: in one process, and with a process for each airplane, \
+                 which talk over sockets of the loopback, in lockstep. Time is that of a clock, from when all have \
+                 joined to the end; bytes are those of packets, without what the network below adds.",
+                plan.cycles
+            ),
             Self::LeftOut { reason } => format!("Left out: {reason}"),
         };
         let heads = [
@@ -187,7 +197,6 @@ impl SocketMeasurements {
 
 #[cfg(test)]
 mod tests {
-    use super::super::SocketsConfig;
     use super::*;
     use sidestep_document::claim::Verdict;
 
@@ -203,7 +212,7 @@ mod tests {
             let alone = measure_in_one_process(text)?;
             Ok(FlightMeasurement { elapsed_s: times(name.expect("a deployment")), ..alone })
         };
-        measure(&plan(seeds), &mut run_fleet, &mut |_, _| ()).expect("right")
+        measure(&plan(seeds), &TrialFile::none(), &mut run_fleet, &mut |_, _| ()).expect("right")
     }
 
     #[test]
@@ -215,7 +224,7 @@ mod tests {
             assert_eq!(case.alone[0].messages, case.over_sockets[0].messages);
             assert_eq!(
                 case.table_cells().len(),
-                SocketMeasurements::Measured(Vec::new()).table().columns.len()
+                SocketMeasurements::Measured(Vec::new()).table(&plan(2).sockets).columns.len()
             );
         }
     }
@@ -233,6 +242,6 @@ mod tests {
     fn what_was_left_out_judges_nothing_and_says_why() {
         let left_out = SocketMeasurements::LeftOut { reason: "not found; get it".into() };
         assert_eq!(left_out.claim(), None);
-        assert_eq!(left_out.table().note, "Left out: not found; get it");
+        assert_eq!(left_out.table(&plan(1).sockets).note, "Left out: not found; get it");
     }
 }

@@ -13,6 +13,7 @@ use crate::case_results::{
 };
 use crate::claims::ReportParts;
 use crate::study::{Progress, Study, setting_number, sub_progress};
+use crate::trial_file::TrialFile;
 use serde::Serialize;
 use sidestep::experiment::sweep::PRIVILEGE_MARK;
 use sidestep::kernel::InputError;
@@ -173,19 +174,23 @@ fn study(map: &Map, plan: &MapfConfig) -> Result<Study, InputError> {
     Ok(study.filtered(|v| plan.robots.contains(&(setting_number(v, ROBOTS) as usize))))
 }
 
-/// Runs the study.
+/// Runs the study, except for trials that are kept.
 ///
 /// `progress` is called with the current map and the finished share of the whole.
 ///
 /// # Errors
 /// When the plan asks for an impossible scenario.
-pub fn run(plan: &MapfConfig, progress: &mut Progress<'_>) -> Result<MapfReport, InputError> {
+pub fn run(
+    plan: &MapfConfig,
+    kept: &TrialFile,
+    progress: &mut Progress<'_>,
+) -> Result<MapfReport, InputError> {
     let mut maps = Vec::with_capacity(MAPS.len());
     let part = 1.0 / MAPS.len() as f64;
     for (number, map) in MAPS.iter().enumerate() {
         let from = number as f64 * part;
         let progress = &mut sub_progress(progress, from, from + part);
-        let results = study(map, plan)?.run(plan.workers, map.name, progress)?;
+        let results = study(map, plan)?.run(plan.workers, map.name, kept, progress)?;
         maps.push(MapResults { map: map.name, cases: COLUMNS.cases(&results) });
     }
     Ok(MapfReport {
@@ -278,7 +283,7 @@ mod tests {
     #[test]
     fn a_rehearsal_runs_every_method_on_every_map_and_judges_every_claim() {
         let short = MapfConfig { seeds: 1, cycles: 40, ..MapfConfig::quick() };
-        let report = run(&short, &mut |_, _| ()).expect("a valid plan");
+        let report = run(&short, &TrialFile::none(), &mut |_, _| ()).expect("a valid plan");
         assert_eq!(report.maps.len(), 5);
         for map in &report.maps {
             for wheels in ALL_WHEELS {

@@ -7,6 +7,7 @@ use crate::case_results::{
     CaseResults, CaseRuns, Columns, Format, Summary, Value, column, figure, series,
 };
 use crate::study::{Progress, Study, setting_number};
+use crate::trial_file::TrialFile;
 use serde::Serialize;
 use sidestep::experiment::sweep::Variant;
 use sidestep::kernel::InputError;
@@ -93,7 +94,8 @@ impl MoverResults {
         plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let results = study(plan)?.run(plan.workers, "discs that move", progress)?;
+        let results =
+            study(plan)?.run(plan.workers, "discs that move", &TrialFile::none(), progress)?;
         Ok(Self { cases: COLUMNS.cases(&results) })
     }
 

@@ -5,6 +5,7 @@ use super::corridor::{CLEARANCE, MAX_SPEED, OWN_GAP, ROD_VIOLATION};
 use super::{DT_S, SerpentineConfig};
 use crate::case_results::{CaseResults, CaseRuns, Columns, Format, Summary, Value, column};
 use crate::study::{Progress, Study, setting_number};
+use crate::trial_file::TrialFile;
 use serde::Serialize;
 use sidestep::experiment::sweep::Variant;
 use sidestep::kernel::InputError;
@@ -91,7 +92,8 @@ impl SnakeResults {
         plan: &SerpentineConfig,
         progress: &mut Progress<'_>,
     ) -> Result<Self, InputError> {
-        let results = study(plan)?.run(plan.workers, "snake in space", progress)?;
+        let results =
+            study(plan)?.run(plan.workers, "snake in space", &TrialFile::none(), progress)?;
         Ok(Self { cases: COLUMNS.cases(&results) })
     }
 

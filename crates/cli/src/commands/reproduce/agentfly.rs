@@ -1,12 +1,13 @@
 //! `sidestep reproduce agentfly`.
 
-use super::{EXAMPLES, PaperResults, check_vacant, store_and_print};
+use super::{EXAMPLES, PaperResults, forget_trials, keep_trials, store_and_print};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::link;
 use crate::progress::StageBar;
 use crate::worlds;
 use clap::Args;
+use sidestep_papers::TrialFile;
 use sidestep_papers::agentfly::{self, AgentflyConfig, FlightMeasurement, SocketMeasurements};
 use sidestep_session::fleet::{
     ClockMode, CommonSettings, FleetJob, Job, JobScenario, LinkMessage, Topology,
@@ -22,7 +23,8 @@ const LEASE_S: f64 = 60.0;
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct AgentflyArgs {
-    /// Output folder (new or empty) for report.html, report.md, report.json and the figures
+    /// Output folder (new or empty) for report.html, report.md, report.json and the figures; after an interrupt the same
+    /// command goes on there
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
@@ -36,7 +38,11 @@ pub(super) struct AgentflyArgs {
 }
 
 /// Measures over real sockets, if the program for them is installed.
-fn measure_sockets(plan: &AgentflyConfig, console: Console) -> Result<SocketMeasurements, Failure> {
+fn measure_sockets(
+    plan: &AgentflyConfig,
+    kept: &TrialFile,
+    console: Console,
+) -> Result<SocketMeasurements, Failure> {
     if let Err(missing) = link::find_program() {
         let reason = missing.to_string();
         console.note(format!("The part over real sockets is left out: {reason}"));
@@ -48,6 +54,7 @@ fn measure_sockets(plan: &AgentflyConfig, console: Console) -> Result<SocketMeas
     let stages = StageBar::new(console);
     let measured = agentfly::measure(
         plan,
+        kept,
         &mut |text: &str| -> Result<FlightMeasurement, Failure> {
             std::fs::write(&file, text).map_err(|e| Failure::cannot_write(&file, &e))?;
             measure_fleet(&file)
@@ -103,17 +110,17 @@ pub(super) fn reproduce(args: &AgentflyArgs, console: Console) -> Result<ExitCod
     let default = if args.quick { AgentflyConfig::quick() } else { AgentflyConfig::default() };
     let plan =
         AgentflyConfig { seeds: args.seeds.map_or(default.seeds, |n| n as usize), ..default };
-    if let Some(folder) = &args.out {
-        check_vacant(folder)?;
-    }
+    let kept = keep_trials(args.out.as_deref(), &plan, console)?;
     let stages = StageBar::new(console);
-    let report = agentfly::run(&plan, &mut |what, share| stages.set(what, share));
+    let report = agentfly::run(&plan, &kept, &mut |what, share| stages.set(what, share));
     stages.clear();
-    let report = report?.with_sockets(measure_sockets(&plan, console)?);
-    store_and_print(
+    let report = report?.with_sockets(measure_sockets(&plan, &kept, console)?);
+    let exit = store_and_print(
         &report,
         &PaperResults { document: report.document(), claims: &report.claims, quick: plan.quick },
         args.out.as_deref(),
         console,
-    )
+    )?;
+    forget_trials(kept, console);
+    Ok(exit)
 }

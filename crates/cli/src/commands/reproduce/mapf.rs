@@ -1,6 +1,6 @@
 //! `sidestep reproduce mapf`.
 
-use super::{EXAMPLES, PaperResults, check_vacant, store_and_print};
+use super::{EXAMPLES, PaperResults, forget_trials, keep_trials, store_and_print};
 use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::progress::StageBar;
@@ -12,7 +12,8 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct MapfArgs {
-    /// Output folder (new or empty) for report.html, report.md, report.json and the figures
+    /// Output folder (new or empty) for report.html, report.md, report.json and the figures; after an interrupt the same
+    /// command goes on there
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
@@ -28,17 +29,17 @@ pub(super) struct MapfArgs {
 pub(super) fn reproduce(args: &MapfArgs, console: Console) -> Result<ExitCode, Failure> {
     let default = if args.quick { MapfConfig::quick() } else { MapfConfig::default() };
     let plan = MapfConfig { seeds: args.seeds.map_or(default.seeds, |n| n as usize), ..default };
-    if let Some(folder) = &args.out {
-        check_vacant(folder)?;
-    }
+    let kept = keep_trials(args.out.as_deref(), &plan, console)?;
     let stages = StageBar::new(console);
-    let report = mapf::run(&plan, &mut |what, share| stages.set(what, share));
+    let report = mapf::run(&plan, &kept, &mut |what, share| stages.set(what, share));
     stages.clear();
     let report = report?;
-    store_and_print(
+    let exit = store_and_print(
         &report,
         &PaperResults { document: report.document(), claims: &report.claims, quick: plan.quick },
         args.out.as_deref(),
         console,
-    )
+    )?;
+    forget_trials(kept, console);
+    Ok(exit)
 }

@@ -7,7 +7,9 @@ mod serpentine;
 
 use crate::console::{Console, align_pairs};
 use crate::exit::{ExitCode, Failure};
+use crate::interrupt;
 use crate::report_files::{PngOutput, ReportFiles};
+use crate::worlds;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use sidestep::kernel::InputError;
@@ -15,7 +17,7 @@ use sidestep_document::Document;
 use sidestep_document::claim::{Claim, verdict_summary};
 use sidestep_document::document::Picture;
 use sidestep_draw::{DrawError, PictureOptions, Style, draw};
-use sidestep_papers::Scene;
+use sidestep_papers::{Scene, TrialFile, TrialFileError, TrialFileHead};
 use std::path::Path;
 
 const EXAMPLES: &str = "\
@@ -75,6 +77,59 @@ fn check_vacant(folder: &Path) -> Result<(), InputError> {
         return Ok(());
     }
     Err(InputError::new(folder.display(), "already exists and is not empty", "give a new folder"))
+}
+
+/// Name of the file with the trials that have ended, beside which the report will be.
+const TRIALS: &str = "trials.jsonl";
+
+/// Opens the file of trials in the folder of a report: a new one, or that of an interrupted command. Nothing is kept
+/// without a folder.
+fn keep_trials(
+    out: Option<&Path>,
+    plan: &impl Serialize,
+    console: Console,
+) -> Result<TrialFile, Failure> {
+    let Some(folder) = out else { return Ok(TrialFile::none()) };
+    let mut plan = serde_json::to_value(plan).expect("a plan is plain data");
+    // No result depends on it.
+    if let Some(fields) = plan.as_object_mut() {
+        fields.remove("workers");
+    }
+    let path = folder.join(TRIALS);
+    if !path.exists() {
+        check_vacant(folder)?;
+    }
+    std::fs::create_dir_all(folder).map_err(|e| Failure::cannot_write(folder, &e))?;
+    let head = TrialFileHead { build: worlds().build().into(), plan };
+    let kept = TrialFile::open(&path, &head).map_err(|error| match error {
+        TrialFileError::Io(e) => Failure::cannot_write(&path, &e),
+        TrialFileError::Other(_) => Failure::Input(InputError::new(
+            path.display(),
+            error.to_string(),
+            "repeat the command with which it began, or give a new folder",
+        )),
+    })?;
+    if kept.known_count() > 0 {
+        console.note(format!("Goes on after {} trials in {}", kept.known_count(), path.display()));
+    }
+    interrupt::on_interrupt(move || {
+        console.note(format!(
+            "What has ended is kept in {}: the same command goes on",
+            path.display()
+        ));
+    })?;
+    Ok(kept)
+}
+
+/// Removes the file of trials, once their report is there, and tells if not all could be kept.
+fn forget_trials(kept: TrialFile, console: Console) {
+    if let Some(error) = kept.take_failure() {
+        console.warn(format!("not all trials could be kept for the case of an interrupt: {error}"));
+    }
+    // The report is complete without it; a file that stays is in nobody's way.
+    if let Err(error) = kept.remove() {
+        console.warn(format!("{TRIALS} could not be removed: {error}"));
+    }
 }
 
 /// The results of a paper's experiments.
