@@ -1,5 +1,9 @@
 //! The games that are optimized.
 
+/// Strategies that are less probable than this do not count in expectations: a player keeps each at a tenth of it, so
+/// that it may return, and after some rounds nearly all are there.
+const MIN_COUNTED_PROBABILITY: f64 = 1e-8;
+
 /// A finite game of common cost.
 pub trait Game {
     /// Returns the number of strategies of each player (shape: players), at least 1 each.
@@ -95,6 +99,9 @@ impl CostTable {
     fn add_expected_costs(&self, q: &[f64], expected: &mut [f64]) {
         for &row in &self.nonzero_rows {
             let p = q[row];
+            if p < MIN_COUNTED_PROBABILITY {
+                continue;
+            }
             expected.iter_mut().zip(self.row(row)).for_each(|(sum, cost)| *sum += cost * p);
         }
     }
@@ -162,6 +169,17 @@ impl PairwiseGame {
         let player_pairs = &mut self.player_pairs[player];
         let slot = player_pairs.partition_point(|&k| pairs[k].other(player) < other);
         player_pairs.insert(slot, index);
+    }
+
+    /// Returns the costs of a player's strategies for itself alone.
+    pub fn own_costs(&self, player: usize) -> &[f64] {
+        &self.own[player]
+    }
+
+    /// Returns the pairs that cost anything: their players `a` and `b`, and the joint costs of their strategies as for
+    /// [`PairwiseGame::add_pair`].
+    pub fn pair_costs(&self) -> impl Iterator<Item = (usize, usize, &[f64])> {
+        self.pairs.iter().map(|pair| (pair.a, pair.b, pair.given_a.costs.as_slice()))
     }
 
     /// Returns the part of a joint move's cost that a player bears.

@@ -3,6 +3,8 @@
 mod external;
 mod group_memory;
 mod local_flight;
+#[cfg(test)]
+mod optima_tests;
 mod preferences;
 mod velocity;
 

@@ -6,6 +6,7 @@ mod earth;
 mod effectless;
 mod network;
 mod optimizer;
+mod remarks;
 mod rule_changes;
 mod start_groups;
 
@@ -21,9 +22,9 @@ use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
-pub(super) use effectless::effectless_remarks;
 use network::NetworkSection;
 use optimizer::{LegsSection, MvpSection, OnOffSwitch, ReactiveSection, TimeList};
+pub(super) use remarks::scenario_remarks;
 use rule_changes::RuleChangeSection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

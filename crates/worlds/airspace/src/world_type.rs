@@ -107,7 +107,7 @@ impl AnyCompiled for CompiledAirspace {
     }
 
     fn remarks(&self) -> Vec<Remark> {
-        super::scenario::effectless_remarks(self)
+        super::scenario::scenario_remarks(self)
     }
 
     fn seed_effect(&self) -> SeedEffect {

@@ -7,7 +7,7 @@ use crate::method::MethodKind;
 use sidestep_scenario::Remark;
 
 /// Returns the remarks on a scenario, in the order of its keys.
-pub(crate) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
+pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     let section = &compiled.recipe.file.airspace;
     let uses = |is_used: fn(&MethodKind) -> bool| {
         let mut rules = compiled.world.all_rules();
