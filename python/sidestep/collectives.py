@@ -33,7 +33,8 @@ class MinimizeResult(NamedTuple):
     bound: float | None
     #: The final distributions, one array over the strategies of each player.
     q: list[NDArray[np.float64]]
-    #: Each player's estimate of the expected cost by strategy, up to a constant: it ranks the strategies.
+    #: Each player's estimate of the expected cost by strategy, up to a constant: it ranks the strategies. After a local
+    #: search it is the cost beside the strategies of the others.
     expected: list[NDArray[np.float64]]
     #: Number of rounds.
     rounds: int
@@ -100,7 +101,7 @@ def minimize(
         "max_rounds": checked_int("max_rounds", max_rounds, 1, 1_000_000_000),
         "choice": choice,
         "local_search": local_search or ("pairs" if is_exact else "none"),
-        "random_starts": checked_int("random_starts", random_starts, 0, 1_000_000),
+        "random_starts": checked_int("random_starts", random_starts, 0, 10_000),
         "seed": checked_int("seed", seed, 0, 2**64 - 1),
     }
     if objective is not None:

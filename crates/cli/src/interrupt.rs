@@ -5,8 +5,8 @@
 
 use crate::exit::{ExitCode, Failure};
 use sidestep::kernel::Interrupt;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// Time that a cycle has to end after Ctrl-C: most take milliseconds, and a user accepts to wait a second.
@@ -52,8 +52,21 @@ pub(crate) fn on_interrupt(cleanup: impl Fn() + Send + 'static) -> Result<(), Fa
     })
 }
 
+/// What Ctrl-C does now. A process may have one handler, and a command may first clean up by it and later listen.
+static HANDLER: Mutex<Option<Box<dyn FnMut() + Send>>> = Mutex::new(None);
+static HAS_HANDLER: AtomicBool = AtomicBool::new(false);
+
 fn set_handler(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
-    ctrlc::set_handler(handler).map_err(|e| {
+    *HANDLER.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(handler));
+    if HAS_HANDLER.swap(true, Ordering::Relaxed) {
+        return Ok(());
+    }
+    let handle = || {
+        if let Some(handler) = &mut *HANDLER.lock().unwrap_or_else(PoisonError::into_inner) {
+            handler();
+        }
+    };
+    ctrlc::set_handler(handle).map_err(|e| {
         Failure::other(format!("cannot listen for Ctrl-C: {e}"), "run it in another terminal")
     })
 }

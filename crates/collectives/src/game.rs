@@ -194,7 +194,8 @@ impl PairwiseGame {
     }
 
     /// Writes `E[G | x_i = x]`, less a part that is the same for all `x`, into `expected` (shape:
-    /// strategies of player `i`), where the others play `q`: the closed form of eq. 3.
+    /// strategies of player `i`), where the others play `q`: the closed form of eq. 3. Strategies that are less probable than
+    /// 1e-8 do not count.
     pub fn expected_costs(&self, player: usize, q: &[Vec<f64>], expected: &mut Vec<f64>) {
         expected.clear();
         expected.extend_from_slice(&self.own[player]);

@@ -1,9 +1,10 @@
 //! Local search from the outcome of the rounds and from further starts: moves of one or two players at a time.
 //!
 //! It is the algorithm MGM-2 (Maheswaran, Pearce and Tambe 2004) without its random draws. In a step every player
-//! tells the cost of each of its strategies beside those of the others, then the move of itself, or of itself and
-//! one later neighbor, that saves most; moves that do not touch each other are made at once. A joint move from which no
-//! two players can save anything is *2-optimal*; of all starts, the cheapest end is taken.
+//! tells the cost of each of its strategies beside those of the others, and then its best move: of itself, or, where
+//! neither it nor a neighbor saves anything alone, of itself and one later neighbor. Moves that do not touch each other are
+//! made at once. A joint move from which no two players can save anything is *2-optimal*; of all starts, the cheapest end
+//! is taken.
 //!
 //! [`optimize`](super::optimize) runs it in one process. Players that know only the pairs that they are part of run
 //! the same functions on messages, and come to the same bits.
@@ -17,6 +18,7 @@ use sidestep_kernel::interrupt;
 const MIN_SAVED_SHARE: f64 = 1e-9;
 /// The share by which a cost may be above a lower bound and counts as equal to it: both are rounded.
 const BOUND_TOLERANCE: f64 = 1e-9;
+
 /// What follows the rounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -94,8 +96,8 @@ impl Descents {
     /// Largest number of steps, which all save something. Fifty players take about 30.
     pub const MAX_STEPS: u32 = 1000;
 
-    /// Creates searches. `starts` are each player's strategies, one a start; `neighbors` those with which it shares a
-    /// cost.
+    /// Creates searches. `starts` are each player's strategies, one a start (shape: players, starts); `neighbors` those
+    /// with which it shares a cost (shape: players, neighbors).
     pub fn new(neighbors: Vec<Vec<usize>>, starts: &[Vec<usize>]) -> Self {
         let count = starts.iter().map(Vec::len).min().unwrap_or(0);
         let unknown_gains: Vec<Vec<PairGain>> =
@@ -153,7 +155,7 @@ impl Descents {
         }
     }
 
-    /// Sets the costs of a player in each open descent.
+    /// Sets the costs of a player in each open descent (shape: open descents).
     pub fn set_player_costs(&mut self, player: usize, costs: Vec<PlayerCosts>) {
         let open = self.descents.iter_mut().filter(|descent| !descent.is_settled);
         for (descent, mut costs) in open.zip(costs) {
@@ -202,6 +204,7 @@ impl Descents {
         for k in 1..self.descents.len() {
             let (before, from) = self.descents.split_at_mut(k);
             let descent = &mut from[0];
+            interrupt::check();
             if !descent.is_settled && before.iter().any(|other| other.joint == descent.joint) {
                 descent.is_settled = true;
                 descent.players.iter_mut().for_each(|player| player.cost = f64::INFINITY);
@@ -210,6 +213,9 @@ impl Descents {
     }
 
     /// Returns the first start, before the first step.
+    ///
+    /// # Panics
+    /// Without a start.
     pub fn first_joint(&self) -> &[usize] {
         &self.descents[0].joint
     }
@@ -231,16 +237,25 @@ impl Descents {
     }
 
     /// Returns the cheapest joint move of all descents.
+    ///
+    /// # Panics
+    /// Without a start.
     pub fn best_joint(&self) -> &[usize] {
         &self.best().joint
     }
 
     /// Returns its cost.
+    ///
+    /// # Panics
+    /// Without a start.
     pub fn best_cost(&self) -> f64 {
         self.best().cost()
     }
 
     /// Returns the cost that each strategy of a player has beside the strategies of the others in it.
+    ///
+    /// # Panics
+    /// Without a start.
     pub fn best_costs_given(&self, player: usize) -> &[f64] {
         &self.best().players[player].given
     }
@@ -307,9 +322,13 @@ impl Descent {
         let table = pair.given(player);
         let of_own = pair.given(other).row(self.joint[other]);
         let of_other = table.row(self.joint[player]);
+        let of_both = of_other[self.joint[other]];
+        let alone = [own[self.joint[player]], others[self.joint[other]]];
         // What they pay to each other counts once.
-        let now = own[self.joint[player]] + others[self.joint[other]] - of_other[self.joint[other]];
-        let mut min_cost = now - min_gain.max(MIN_SAVED_SHARE * now.abs());
+        let now = alone[0] + alone[1] - of_both;
+        // Of the terms and not of their sum, which may cancel.
+        let scale = alone[0].abs() + alone[1].abs() + of_both.abs();
+        let mut min_cost = now - min_gain.max(MIN_SAVED_SHARE * scale);
         // Costs without the pair's, of which most strategies have none.
         let least_own = if pair.given(other).is_nonzero(self.joint[other]) {
             least_difference(own, of_own)
@@ -576,13 +595,22 @@ mod tests {
 
     #[test]
     fn a_player_of_unknown_costs_keeps_its_strategy() {
-        let game = game(&[3, 3], &[1.0, 5.0, 2.0, 7.0, 3.0]);
-        let mut descents = Descents::new(vec![vec![1], vec![0]], &[vec![1], vec![1]]);
-        let costs = descents.player_costs(&game, 0);
-        descents.set_player_costs(0, costs);
-        descents.keep_strategy(&game, 1);
-        let moves = descents.player_moves(&game, 0);
-        let partner = moves[0].and_then(|one| one.partner);
-        assert!(partner.is_none_or(|(_, strategy)| strategy == 1), "{moves:?}");
+        // Only both together save anything: from 2 to 0.
+        let mut game = PairwiseGame::new(vec![vec![1.0, 0.0]; 2]);
+        game.add_pair(0, 1, vec![0.0, 9.0, 9.0, 0.0]);
+        let moves = |is_known: bool| {
+            let mut descents = Descents::new(vec![vec![1], vec![0]], &[vec![0], vec![0]]);
+            for player in 0..2 {
+                let costs = descents.player_costs(&game, player);
+                descents.set_player_costs(player, costs);
+            }
+            if !is_known {
+                descents.keep_strategy(&game, 1);
+            }
+            descents.player_moves(&game, 0)
+        };
+        let both = PairMove { gain: 2.0, strategy: 1, partner: Some((1, 1)) };
+        assert_eq!(moves(true), [Some(both)]);
+        assert_eq!(moves(false), [None]);
     }
 }

@@ -16,7 +16,7 @@ pub struct Minimum {
 const MIN_SAVED_SHARE: f64 = 1e-9;
 
 /// Returns the minimum of a game, or `None` if it is not found by looking at `max_nodes` partial joint moves. `start` is
-/// a joint move to begin with: the cheaper it is, the less has to be looked at.
+/// a joint move (shape: players) to begin with: the cheaper it is, the less has to be looked at.
 pub fn find_minimum(game: &PairwiseGame, start: &[usize], max_nodes: u64) -> Option<Minimum> {
     let best = Minimum { joint: start.to_vec(), cost: game.cost(start) };
     let mut search = BranchAndBound { game, best, joint: start.to_vec(), nodes_left: max_nodes };

@@ -120,7 +120,8 @@ pub struct OptimizeResult {
     /// The final distributions.
     pub q: Vec<Vec<f64>>,
     /// Each player's final estimate of `E[G | x]`, up to a constant: it ranks the strategies that
-    /// were not chosen. After a local search it is the cost beside the chosen strategies of the others.
+    /// were not chosen. After a local search it is the cost beside the chosen strategies of the others; none follows where
+    /// the rounds have come to the lower bound.
     pub expected: Vec<Vec<f64>>,
     /// The cost of the chosen joint move.
     pub cost: f64,
@@ -133,7 +134,8 @@ pub struct OptimizeResult {
 }
 
 /// Optimizes a game. `uniform(player, k)` is the `k`-th uniform number in [0, 1) of a player's own
-/// stream: samples use them in order, and the one after the last is for the final draw.
+/// stream: samples use them in order, the one after the last is for the final draw, and those after it for the random
+/// starts of a local search.
 ///
 /// # Panics
 /// When the estimator is exact, or a local search is to follow, and the game is not a sum over pairs.

@@ -28,7 +28,6 @@ pub mod methods;
 mod scene;
 pub mod serpentine;
 mod study;
-
 mod trial_file;
 
 pub use scene::Scene;

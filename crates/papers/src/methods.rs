@@ -105,7 +105,7 @@ impl Comparison<'_> {
                 MethodRuns { source: &source, workers: self.workers, interrupt: &self.interrupt };
             let (effect, metrics) =
                 runs.run_seeds(self.seeds, |share| progress(method.name(), share))?;
-            let bare = match bare_source(&source)? {
+            let bare = match bare_source(&source) {
                 Some(bare) => {
                     let runs = MethodRuns { source: &bare, ..runs };
                     let name = format!("{} without the shield", method.name());
@@ -121,12 +121,14 @@ impl Comparison<'_> {
     }
 }
 
-/// Returns a scenario without its shield; `None` if it has none.
-fn bare_source(source: &Source) -> Result<Option<Source>, InputError> {
-    if !CompiledAirspace::new(source)?.world.shield {
-        return Ok(None);
+/// Returns a scenario without its shield; `None` if it has none, or rules that need it.
+fn bare_source(source: &Source) -> Option<Source> {
+    if !CompiledAirspace::new(source).is_ok_and(|compiled| compiled.world.shield) {
+        return None;
     }
-    source.clone().with_overrides(&[setting("airspace.shield", "off").to_override()]).map(Some)
+    let overrides = [setting("airspace.shield", "off").to_override()];
+    let bare = source.clone().with_overrides(&overrides).ok()?;
+    CompiledAirspace::new(&bare).is_ok().then_some(bare)
 }
 
 /// The runs of a scenario with several seeds.

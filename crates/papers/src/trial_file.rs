@@ -1,14 +1,14 @@
 //! The trials of experiments that have ended, in a file: an interrupted command goes on from there.
 //!
-//! The first line says which experiments the file is of, each further one is a trial: JSON, one value a line. A line that
-//! a kill has left half written, the last one, is dropped.
+//! The first line says which experiments the file is of, each further one is a trial: JSON, one value a line. The last line
+//! is dropped if a kill has left it half written; nothing else in the file is ever changed. One command has it at a time.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
-use std::io::{self, Write as _};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -34,9 +34,12 @@ pub enum TrialFileError {
     /// It cannot be read or written.
     #[error("{0}")]
     Io(#[from] io::Error),
+    /// Another command writes to it.
+    #[error("another command writes to it")]
+    InUse,
     /// It is no such file, or of other experiments.
     #[error("it is the beginning of {0}")]
-    Other(&'static str),
+    Other(String),
 }
 
 /// The trials that have ended, kept in a file or not at all.
@@ -57,19 +60,23 @@ impl TrialFile {
     /// Opens a file, or begins one if there is none; trials in it are not run again.
     ///
     /// # Errors
-    /// When it cannot be read or written, or is of other experiments.
+    /// When it cannot be read or written, is of other experiments, or another command has it.
     pub fn open(path: &Path, head: &TrialFileHead) -> Result<Self, TrialFileError> {
-        let text = match std::fs::read_to_string(path) {
-            Err(e) if e.kind() == io::ErrorKind::NotFound => String::new(),
-            read => read?,
-        };
-        let known = read_trials(&text, head)?;
-        // Written anew, so that no half line is before the next one.
-        let mut file = OpenOptions::new().create(true).truncate(true).write(true).open(path)?;
-        write_line(&mut file, head)?;
-        for (trial, result) in &known {
-            let ended = EndedTrial { trial: trial.clone(), result: result.clone() };
-            write_line(&mut file, &ended)?;
+        let mut file = OpenOptions::new().create(true).read(true).append(true).open(path)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(TrialFileError::InUse),
+            Err(TryLockError::Error(error)) => return Err(error.into()),
+        }
+        let mut text = String::new();
+        file.read_to_string(&mut text)?;
+        let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        let known = read_trials(&text[..whole], head)?;
+        if whole < text.len() {
+            file.set_len(whole as u64)?;
+        }
+        if whole == 0 {
+            write_line(&mut file, head)?;
         }
         Ok(Self {
             path: Some(path.to_path_buf()),
@@ -140,21 +147,22 @@ fn read_trials(
     text: &str,
     head: &TrialFileHead,
 ) -> Result<BTreeMap<String, Value>, TrialFileError> {
+    let other = |what: &str| TrialFileError::Other(what.into());
     let mut known = BTreeMap::new();
-    let mut lines = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));
-    let Some(first) = lines.next() else { return Ok(known) };
-    let found: TrialFileHead =
-        serde_json::from_str(first).map_err(|_| TrialFileError::Other("something else"))?;
+    let mut lines = text.lines().zip(1..);
+    let Some((first, _)) = lines.next() else { return Ok(known) };
+    let found: TrialFileHead = serde_json::from_str(first).map_err(|_| other("something else"))?;
     if found.plan != head.plan {
-        return Err(TrialFileError::Other("other experiments"));
+        return Err(other("other experiments"));
     }
     if found.build != head.build {
-        return Err(TrialFileError::Other("these experiments by another build of this program"));
+        return Err(other("these experiments by another build of this program"));
     }
-    for line in lines {
-        if let Ok(EndedTrial { trial, result }) = serde_json::from_str(line) {
-            known.insert(trial, result);
-        }
+    for (line, number) in lines {
+        let EndedTrial { trial, result } = serde_json::from_str(line).map_err(|error| {
+            other(&format!("these experiments, but line {number} is damaged: {error}"))
+        })?;
+        known.insert(trial, result);
     }
     Ok(known)
 }
@@ -189,9 +197,13 @@ mod tests {
         assert_eq!(run_trials(&first, 3), (vec![0, 1, 4], 3));
         let text = std::fs::read_to_string(&path).expect("kept");
         std::fs::write(&path, &text[..text.len() - 5]).expect("written");
+        drop(first);
         let second = TrialFile::open(&path, &head(3)).expect("goes on");
         assert_eq!(second.known_count(), 2);
         assert_eq!(run_trials(&second, 4), (vec![0, 1, 4, 9], 2));
+        let in_use = TrialFile::open(&path, &head(3)).expect_err("one command at a time");
+        assert!(matches!(in_use, TrialFileError::InUse), "{in_use}");
+        drop(second);
         let third = TrialFile::open(&path, &head(3)).expect("goes on");
         assert_eq!(run_trials(&third, 4).1, 0);
         assert!(third.take_failure().is_none());
@@ -211,9 +223,13 @@ mod tests {
             assert!(error.contains(words), "{error}");
         }
         assert_eq!(std::fs::read_to_string(&path).expect("kept"), text);
-        std::fs::write(&path, "a letter\n").expect("written");
-        let error = TrialFile::open(&path, &head(3)).expect_err("refused").to_string();
-        assert!(error.contains("something else"), "{error}");
+        for (content, words) in
+            [("a letter\n".into(), "something else"), (text + "{}\n", "line 2 is damaged")]
+        {
+            std::fs::write(&path, content).expect("written");
+            let error = TrialFile::open(&path, &head(3)).expect_err("refused").to_string();
+            assert!(error.contains(words), "{error}");
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ use sidestep_papers::methods::{Comparison, SeedSpan, table};
 const EXAMPLES: &str = "\
 Examples:
   sidestep compare scenarios/airspace/superconflict.toml --runs 20
-  sidestep compare sky.toml --methods pc,mvp --set airspace.shield=off --json";
+  sidestep compare sky.toml --methods pc,mvp --json";
 
 /// Compare collision avoidance methods on the same air traffic.
 #[derive(Debug, Args)]
@@ -31,7 +31,8 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_delimiter = ',', default_value = "pc,orca,mvp,none")]
     methods: Vec<MethodName>,
 
-    /// Number of runs of each method, with consecutive seeds from the scenario's on
+    /// Number of runs of each method, with consecutive seeds from the scenario's on; where the scenario has a shield, as
+    /// many without it
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     runs: u32,
 }

@@ -1,6 +1,6 @@
 //! Speed of the airspace world and of its optimizer.
 //!
-//! `cargo bench -p sidestep-airspace [-- PART ...]` with the parts `exact`, `sampled` and `many`;
+//! `cargo bench -p sidestep-airspace --bench airspace [-- PART ...]` with the parts `exact`, `sampled` and `many`;
 //! CPU time, and ratios taken in one run, because the machine may be noisy.
 
 use cpu_time::ProcessTime;

@@ -1,5 +1,6 @@
 //! Runs whose pilots are outside of them: each cycle they receive their percepts, and return their controls.
 
+use crate::agents::ReachedCost;
 use crate::decide::possible_profiles;
 use crate::events::EventKind;
 use crate::method::MethodKind;
@@ -220,10 +221,17 @@ impl AirspaceWorld {
         // Where the network is reliable, no airplane keeps any.
         let are_contacts_valid = self.network.is_some() || control.memory.contacts.is_empty();
         let are_resolutions_valid = control.memory.resolving.check(n).is_ok();
-        if are_events_valid && are_known && are_contacts_valid && are_resolutions_valid {
+        let is_status_valid = control.optimized.is_none_or(|status| {
+            let is_action = (status.chosen as usize) < self.actions(control.id).len();
+            let has_costs =
+                |reached: ReachedCost| reached.cost.is_finite() && reached.bound.is_finite();
+            is_action && status.reached.is_none_or(has_costs)
+        });
+        let is_memory_valid = are_known && are_contacts_valid && are_resolutions_valid;
+        if are_events_valid && is_memory_valid && is_status_valid {
             return Ok(());
         }
-        Err("its events or its memory are impossible for a pilot".into())
+        Err("its events, its memory or its optimization are impossible for a pilot".into())
     }
 }
 

@@ -105,7 +105,7 @@ struct AirspaceSection {
     local_search: Option<Spanned<LocalSearch>>,
     /// Number of random starts of the local search.
     random_starts: Option<Spanned<Integer<0, 100>>>,
-    /// Groups of up to this many airplanes are told the true minimum of the objective.
+    /// The true minimum of the objective is recorded for groups of up to this many airplanes.
     minimum_up_to: Option<Integer<0, 8>>,
     vertical_m: Option<Number<LevelGap>>,
     replay_until_s: Option<Number<ReplayUntilRange>>,

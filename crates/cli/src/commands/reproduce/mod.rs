@@ -96,17 +96,20 @@ fn keep_trials(
         fields.remove("workers");
     }
     let path = folder.join(TRIALS);
-    if !path.exists() {
+    let has_trials_alone = std::fs::read_dir(folder).is_ok_and(|mut entries| {
+        entries.all(|entry| entry.is_ok_and(|entry| entry.file_name() == TRIALS))
+    });
+    if !has_trials_alone {
         check_vacant(folder)?;
     }
     std::fs::create_dir_all(folder).map_err(|e| Failure::cannot_write(folder, &e))?;
     let head = TrialFileHead { build: worlds().build().into(), plan };
     let kept = TrialFile::open(&path, &head).map_err(|error| match error {
         TrialFileError::Io(e) => Failure::cannot_write(&path, &e),
-        TrialFileError::Other(_) => Failure::Input(InputError::new(
+        TrialFileError::InUse | TrialFileError::Other(_) => Failure::Input(InputError::new(
             path.display(),
             error.to_string(),
-            "repeat the command with which it began, or give a new folder",
+            "give the arguments with which it began, or a new folder",
         )),
     })?;
     if kept.known_count() > 0 {
@@ -126,7 +129,7 @@ fn forget_trials(kept: TrialFile, console: Console) {
     if let Some(error) = kept.take_failure() {
         console.warn(format!("not all trials could be kept for the case of an interrupt: {error}"));
     }
-    // The report is complete without it; a file that stays is in nobody's way.
+    // The report is complete without it.
     if let Err(error) = kept.remove() {
         console.warn(format!("{TRIALS} could not be removed: {error}"));
     }

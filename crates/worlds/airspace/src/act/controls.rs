@@ -92,10 +92,13 @@ fn record_outcomes(
         scratch.exchanged.add(deciding);
         return;
     }
-    let mut reached = optimized.iter().find_map(|one| one.reached);
-    let mut minimum = None;
     let are_all_decided =
         optimized.len() == own.len() && optimized.iter().all(|one| one.is_decided);
+    // Where messages get lost, airplanes may know different costs: then that of what all fly is unknown.
+    let first = optimized.first().and_then(|one| one.reached);
+    let is_agreed = are_all_decided && optimized.iter().all(|one| one.reached == first);
+    let mut reached = first.filter(|_| is_agreed);
+    let mut minimum = None;
     if are_all_decided && own.len() <= world.minimum_up_to {
         let group: Vec<KnownAircraft> = own.iter().map(OwnshipState::as_known_aircraft).collect();
         let joint: Vec<usize> = optimized.iter().map(|one| one.chosen as usize).collect();

@@ -78,6 +78,8 @@ struct PredictionSharingMember {
     search: SearchMember,
     /// Whether nothing more is heard from it: its last message holds for all later rounds.
     gone: bool,
+    /// Whether its options are presumed, because it was never heard.
+    is_presumed: bool,
 }
 
 impl PredictionSharingMember {
@@ -271,20 +273,18 @@ impl PredictionSharingAgent {
         let (Some(game), Some(search)) = (&self.game, &mut self.search) else {
             return OptimizerStep::Conclude;
         };
-        let choice = self.own.settings().choice;
-        let mut group = Vec::with_capacity(self.members.len());
-        for (place, member) in self.members.iter().enumerate() {
-            let q = member.action_distribution(self.round);
-            let u = self.own.common.uniform(place, 0);
-            let actions = game.strategies()[place];
-            group.push(SearchPeer {
-                said: &member.search,
-                is_gone: member.gone,
-                chosen: q.map_or(0, |q| choice.choose(q, u)).min(actions - 1),
-                actions,
-            });
+        let group = self.members.iter().map(|member| SearchPeer {
+            said: &member.search,
+            is_gone: member.gone,
+            is_presumed: member.is_presumed,
+        });
+        let group: Vec<SearchPeer<'_>> = group.collect();
+        let next = search.step(game, &group);
+        let step = search.steps();
+        for member in &mut self.members {
+            member.search.forget_before(step);
         }
-        match search.step(game, &group) {
+        match next {
             SearchStep::Over => OptimizerStep::Conclude,
             SearchStep::Send(message) => {
                 self.members[self.own.me].search.receive(message.clone());
@@ -480,6 +480,7 @@ impl Optimizer for PredictionSharingAgent {
             // Samples are numbers of options, which are unknown here, so they mean nothing.
             *member = PredictionSharingMember {
                 gone: true,
+                is_presumed: true,
                 beacon: member.beacon.take(),
                 ..PredictionSharingMember::default()
             };

@@ -15,8 +15,8 @@ use sidestep_scenario::{Closed, LeftOpen, Number, Rule as _, invalid_value, sche
 
 /// Largest number of samples of a block. All of them are kept in memory, and with more an exact estimator is faster.
 const MAX_BLOCK_SAMPLES: usize = 10_000;
-/// Random starts of a local search. With this number it finds the minimum in 98 of 100 games of ten airplanes, with half
-/// of it in 95, and takes less time than the rounds.
+/// Random starts of a local search. With this number it finds the minimum in nine of ten random games of two to twenty
+/// airplanes (`benches/optima.rs`), and takes less time than the rounds; with two more of three, in one more of twenty.
 const RANDOM_STARTS: u32 = 8;
 /// Largest number of times in a list. Each adds as many actions as there are turn rates, and the cost of a pair grows
 /// with the square of the number of actions.
@@ -202,7 +202,8 @@ impl Compiler<'_> {
         };
         if local_search == LocalSearch::None {
             let cause = "random_starts, but no local search that would start there";
-            let remedy = "set local_search = \"pairs\", or leave random_starts out";
+            let remedy = "leave random_starts out; a local search is there with estimator = { kind = \
+                          \"exact\" } and local_search = \"pairs\"";
             return Err(self.source.error(given.span(), cause, remedy));
         }
         Ok(given.get_ref().get() as u32)

@@ -6,8 +6,8 @@ use sidestep_scenario::Remark;
 
 /// Acceleration of gravity in meters per second squared.
 const GRAVITY_M_S2: f64 = 9.80665;
-/// Largest acceleration to the side of a turn that any aircraft is taken to fly, in gravities: 80 degrees of bank. Combat
-/// aircraft pull more for seconds, and no turn that they repeat every few minutes.
+/// Largest acceleration to the side of a turn without a warning, in gravities: 80 degrees of bank. Aerobatic and combat
+/// aircraft pull more for seconds, and not in every turn.
 const MAX_TURN_GRAVITIES: f64 = 5.67;
 
 /// Tangent of 30 degrees of bank, a turn that airplanes fly all the time.
@@ -20,7 +20,7 @@ pub(crate) fn scenario_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     remarks
 }
 
-/// Returns a warning of the hardest turn, if no aircraft could fly it.
+/// Returns a warning of the hardest turn, if hardly any aircraft could fly it.
 fn turn_remark(compiled: &CompiledAirspace) -> Option<Remark> {
     let turns = compiled.world.airplanes.iter().map(|airplane| {
         let model = &airplane.model;
@@ -32,7 +32,7 @@ fn turn_remark(compiled: &CompiledAirspace) -> Option<Remark> {
     }
     let usual_deg_s = (GRAVITY_M_S2 * USUAL_BANK_TANGENT / model.v_m_s).to_degrees();
     let words = format!(
-        "turns of {} deg/s at {} m/s need {gravities:.0} times the acceleration of gravity, which no aircraft flies: \
+        "turns of {} deg/s at {} m/s need {gravities:.0} times the acceleration of gravity, which hardly any aircraft flies: \
          at 30 degrees of bank it turns by {usual_deg_s:.2} deg/s",
         round_to_hundredths(model.omega_max_rad_s.to_degrees()),
         round_to_hundredths(model.v_m_s),
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_that_no_aircraft_flies_are_named_with_a_rate_that_one_does() {
+    fn turns_that_hardly_any_aircraft_flies_are_named_with_a_rate_that_most_do() {
         assert_eq!(remarks(""), []);
         assert_eq!(remarks("v_m_s = 12.0\nomega_max_deg_s = 90.0"), [], "a multirotor");
         let [warning] = &remarks("v_m_s = 300.0\nomega_max_deg_s = 75.0")[..] else {

@@ -1,6 +1,6 @@
 //! Checks of the others' messages, before an agent accepts them.
 
-use super::search::SearchLimits;
+use super::search::{LocalSearchAgent, SearchLimits};
 use super::{PredictionSharingAgent, PredictionSharingMessage};
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use sidestep_collectives::{Estimator, LocalSearch};
@@ -60,7 +60,10 @@ impl PredictionSharingAgent {
                 InvalidMessage::Kind.ensure(is_local)?;
                 let actions: Vec<usize> =
                     common.filed.iter().map(|one| one.actions.len()).collect();
-                message.check(from, &SearchLimits { actions: &actions, starts: self.starts() })
+                let made = self.search.as_ref().map_or(0, LocalSearchAgent::steps);
+                let limits =
+                    SearchLimits { actions: &actions, starts: self.starts(), max_step: made + 1 };
+                message.check(from, &limits)
             }
         }
     }

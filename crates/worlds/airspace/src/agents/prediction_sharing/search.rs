@@ -2,6 +2,10 @@
 //!
 //! Each tells its starts and neighbors, then its part of the bound, and then step by step the costs of its actions and
 //! its best moves: the functions that one process runs for all, on the same numbers.
+//!
+//! A member that was never heard is presumed to fly on, and has one action in the search of each. One that falls silent in
+//! the midst of the search ends it: nobody knows which of the actions that were in discussion it flies, so that the others
+//! fly what the rounds have chosen.
 
 use crate::agents::ReachedCost;
 use crate::agents::participant::InvalidMessage;
@@ -56,6 +60,8 @@ pub(super) struct SearchLimits<'a> {
     pub(super) actions: &'a [usize],
     /// Number of starts.
     pub(super) starts: usize,
+    /// Number of the last step that anybody can be in: no member is more than one ahead.
+    pub(super) max_step: u32,
 }
 
 impl SearchMessage {
@@ -77,7 +83,7 @@ impl SearchMessage {
         from: usize,
         limits: &SearchLimits<'_>,
     ) -> Result<(), InvalidMessage> {
-        let SearchLimits { actions, starts } = *limits;
+        let SearchLimits { actions, starts, max_step } = *limits;
         match self {
             Self::Start(start) => {
                 InvalidMessage::Length.ensure(start.actions.len() == starts)?;
@@ -92,7 +98,7 @@ impl SearchMessage {
                 InvalidMessage::Number.ensure(is_cost(*cost) && is_cost(*bound))
             }
             Self::Costs { step, costs } => {
-                InvalidMessage::Round.ensure(*step < Descents::MAX_STEPS)?;
+                InvalidMessage::Round.ensure(*step <= max_step)?;
                 let fits = |one: &PlayerCosts| one.given.len() == actions[from];
                 InvalidMessage::Length.ensure(costs.len() <= starts && costs.iter().all(fits))?;
                 let has_costs = |one: &PlayerCosts| {
@@ -101,7 +107,7 @@ impl SearchMessage {
                 InvalidMessage::Number.ensure(costs.iter().all(has_costs))
             }
             Self::Moves { step, moves } => {
-                InvalidMessage::Round.ensure(*step < Descents::MAX_STEPS)?;
+                InvalidMessage::Round.ensure(*step <= max_step)?;
                 InvalidMessage::Length.ensure(moves.len() <= starts)?;
                 moves.iter().flatten().try_for_each(|one| {
                     InvalidMessage::Number
@@ -131,6 +137,12 @@ pub(super) struct SearchMember {
 }
 
 impl SearchMember {
+    /// Forgets what was said in earlier steps.
+    pub(super) fn forget_before(&mut self, step: u32) {
+        self.costs.retain(|said_in, _| *said_in >= step);
+        self.moves.retain(|said_in, _| *said_in >= step);
+    }
+
     /// Keeps a message.
     pub(super) fn receive(&mut self, message: SearchMessage) {
         match message {
@@ -150,12 +162,10 @@ impl SearchMember {
 pub(super) struct SearchPeer<'a> {
     /// What it has said.
     pub(super) said: &'a SearchMember,
-    /// Whether nothing more is heard from it: it keeps its action.
+    /// Whether nothing more is heard from it.
     pub(super) is_gone: bool,
-    /// The action that it has chosen after the rounds, as far as is known.
-    pub(super) chosen: usize,
-    /// Number of its actions in the agent's game.
-    pub(super) actions: usize,
+    /// Whether it was never heard, so that it has one action, which is presumed.
+    pub(super) is_presumed: bool,
 }
 
 /// The messages that an agent waits for.
@@ -176,6 +186,8 @@ pub(super) struct LocalSearchAgent {
     descents: Descents,
     /// What the joint action costs, once that is known.
     reached: Option<ReachedCost>,
+    /// Whether it has descended to its end.
+    is_complete: bool,
 }
 
 /// The result of a step of the local search.
@@ -194,7 +206,8 @@ impl LocalSearchAgent {
             neighbors: game.neighbors(me).map(|place| place as u32).collect(),
         };
         let descents = Descents::default();
-        let search = Self { me, phase: SearchPhase::Starts, descents, reached: None };
+        let phase = SearchPhase::Starts;
+        let search = Self { me, phase, descents, reached: None, is_complete: false };
         (search, SearchMessage::Start(start))
     }
 
@@ -210,8 +223,18 @@ impl LocalSearchAgent {
         }
     }
 
-    /// Takes the next step, for which no message is missing.
+    /// Returns the number of steps made.
+    pub(super) fn steps(&self) -> u32 {
+        self.descents.steps()
+    }
+
+    /// Takes the next step, for which no message is missing but those of members that are gone.
     pub(super) fn step(&mut self, game: &PairwiseGame, group: &[SearchPeer<'_>]) -> SearchStep {
+        let is_silent =
+            |peer: &SearchPeer<'_>| peer.is_gone && !peer.is_presumed && !self.has_heard(peer.said);
+        if group.iter().any(is_silent) {
+            return self.give_up();
+        }
         match self.phase {
             SearchPhase::Starts => {
                 self.descents = start_descents(game, self.me, group);
@@ -232,10 +255,21 @@ impl LocalSearchAgent {
         }
     }
 
+    /// Ends the search without a result.
+    fn give_up(&mut self) -> SearchStep {
+        self.phase = SearchPhase::Over;
+        self.is_complete = false;
+        self.reached = None;
+        SearchStep::Over
+    }
+
     /// Ends the search if the first start is a minimum, or begins to descend.
     fn check_bound(&mut self, game: &PairwiseGame, group: &[SearchPeer<'_>]) -> SearchStep {
-        // One that was not heard adds the costs of its only action to both.
         let parts = || group.iter().filter_map(|peer| peer.said.bound);
+        // The parts of one that is presumed are unknown, so that sums would be of different things.
+        if parts().count() < group.len() {
+            return self.send_costs(game);
+        }
         let cost = parts().fold(0.0, |sum, part| sum + part.cost);
         let bound = parts().fold(0.0, |sum, part| sum + part.bound);
         self.reached = Some(ReachedCost { cost, bound });
@@ -256,13 +290,15 @@ impl LocalSearchAgent {
     /// Returns its best moves by the costs of all.
     fn propose_moves(&mut self, game: &PairwiseGame, group: &[SearchPeer<'_>]) -> SearchStep {
         let step = self.descents.steps();
+        let open = self.descents.count_open();
         for (place, peer) in group.iter().enumerate() {
-            // Agents that have lost different messages may have different descents that go on.
-            let said = peer.said.costs.get(&step).filter(|_| peer.actions > 1);
-            let costs = said.filter(|costs| costs.len() == self.descents.count_open());
-            match costs {
-                Some(costs) => self.descents.set_player_costs(place, costs.clone()),
-                None => self.descents.keep_strategy(game, place),
+            match peer.said.costs.get(&step) {
+                _ if peer.is_presumed => self.descents.keep_strategy(game, place),
+                Some(costs) if costs.len() == open => {
+                    self.descents.set_player_costs(place, costs.clone());
+                }
+                // It has other descents: the two do not know the same.
+                _ => return self.give_up(),
             }
         }
         self.phase = SearchPhase::Moves;
@@ -273,14 +309,19 @@ impl LocalSearchAgent {
     /// Makes the moves of all, and ends the search when nobody has any.
     fn make_moves(&mut self, game: &PairwiseGame, group: &[SearchPeer<'_>]) -> SearchStep {
         let step = self.descents.steps();
+        let open = self.descents.count_open();
         let mut moves = Vec::with_capacity(group.len());
         for peer in group {
-            let said = peer.said.moves.get(&step).filter(|_| !peer.is_gone && peer.actions > 1);
-            let mut of_peer = said.cloned().unwrap_or_default();
-            for one in of_peer.iter_mut().flatten() {
-                // One that was not heard has no other action here.
-                let is_known = |&(partner, x): &(usize, usize)| x < group[partner].actions;
-                one.partner = one.partner.filter(is_known);
+            let mut of_peer = match peer.said.moves.get(&step) {
+                _ if peer.is_presumed => Vec::new(),
+                Some(moves) if moves.len() == open => moves.clone(),
+                _ => return self.give_up(),
+            };
+            for offer in &mut of_peer {
+                // One that is presumed has no other action here, and half of a move of two saves nothing.
+                *offer = offer.filter(|offer| {
+                    offer.partner.is_none_or(|(partner, _)| !group[partner].is_presumed)
+                });
             }
             moves.push(of_peer);
         }
@@ -292,6 +333,7 @@ impl LocalSearchAgent {
         if let Some(reached) = &mut self.reached {
             reached.cost = self.descents.best_cost();
         }
+        self.is_complete = true;
         SearchStep::Over
     }
 
@@ -303,25 +345,24 @@ impl LocalSearchAgent {
     /// Returns its action and the costs of all of its actions beside those of the others, if it has descended to its
     /// end.
     pub(super) fn end(&self) -> Option<(usize, &[f64])> {
-        let is_over = self.phase == SearchPhase::Over && self.descents.steps() > 0;
-        is_over
+        self.is_complete
             .then(|| (self.descents.best_joint()[self.me], self.descents.best_costs_given(self.me)))
     }
 }
 
-/// Returns the descents from the starts of all. One that has not told its starts keeps the action that it has chosen.
+/// Returns the descents from the starts of all.
 fn start_descents(game: &PairwiseGame, me: usize, group: &[SearchPeer<'_>]) -> Descents {
     let count = group[me].said.start.as_ref().map_or(0, |start| start.actions.len());
     let mut starts = Vec::with_capacity(group.len());
     let mut neighbors = Vec::with_capacity(group.len());
     for (place, peer) in group.iter().enumerate() {
-        match peer.said.start.as_ref().filter(|_| peer.actions > 1) {
-            Some(start) => {
+        match &peer.said.start {
+            Some(start) if !peer.is_presumed => {
                 starts.push(start.actions.iter().map(|&x| x as usize).collect());
                 neighbors.push(start.neighbors.iter().map(|&place| place as usize).collect());
             }
-            None => {
-                starts.push(vec![peer.chosen; count]);
+            _ => {
+                starts.push(vec![0; count]);
                 // The agent knows of no pairs but its own.
                 let is_neighbor = game.neighbors(me).any(|neighbor| neighbor == place);
                 neighbors.push(if is_neighbor { vec![me] } else { Vec::new() });
@@ -329,4 +370,187 @@ fn start_descents(game: &PairwiseGame, me: usize, group: &[SearchPeer<'_>]) -> D
         }
     }
     Descents::new(neighbors, &starts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_collectives::Game;
+
+    const PLAYERS: usize = 5;
+    const ACTIONS: usize = 4;
+
+    /// Returns the game with the pairs that `has_pair` lets in: of everybody, or of one agent.
+    fn game(has_pair: impl Fn(usize, usize) -> bool) -> PairwiseGame {
+        let cost = |k: usize| (k * k * 37 % 101) as f64;
+        let own = (0..PLAYERS).map(|i| (0..ACTIONS).map(|x| cost(7 * i + x)).collect()).collect();
+        let mut game = PairwiseGame::new(own);
+        for (i, j) in (0..PLAYERS).flat_map(|i| (i + 1..PLAYERS).map(move |j| (i, j))) {
+            // Not all share a cost, so that moves can be made at the same time.
+            if j - i < 3 && has_pair(i, j) {
+                let first = 100 * i + 1000 * j;
+                let costs = (first..first + ACTIONS * ACTIONS).map(|k| 2.0 * cost(k));
+                game.add_pair(i, j, costs.collect());
+            }
+        }
+        game
+    }
+
+    fn starts(player: usize) -> Vec<usize> {
+        (0..6).map(|start| (player * start) % ACTIONS).collect()
+    }
+
+    /// Agents, and what each has heard of each.
+    struct Group {
+        games: Vec<PairwiseGame>,
+        agents: Vec<LocalSearchAgent>,
+        heard: Vec<Vec<SearchMember>>,
+        sent: Vec<u32>,
+    }
+
+    impl Group {
+        fn new() -> Self {
+            let games: Vec<PairwiseGame> =
+                (0..PLAYERS).map(|me| game(|i, j| i == me || j == me)).collect();
+            let mut group = Self {
+                agents: Vec::new(),
+                heard: (0..PLAYERS)
+                    .map(|_| (0..PLAYERS).map(|_| SearchMember::default()).collect())
+                    .collect(),
+                sent: vec![0; PLAYERS],
+                games,
+            };
+            for me in 0..PLAYERS {
+                let (agent, message) = LocalSearchAgent::new(&group.games[me], me, &starts(me));
+                group.agents.push(agent);
+                group.send(me, &message);
+            }
+            group
+        }
+
+        fn send(&mut self, from: usize, message: &SearchMessage) {
+            self.sent[from] += 1;
+            for heard in &mut self.heard {
+                heard[from].receive(message.clone());
+            }
+        }
+
+        /// Runs all agents to their ends; one may fall silent after some messages.
+        fn run(mut self, silent: Option<(usize, u32)>) -> Vec<LocalSearchAgent> {
+            let is_silent = |place: usize, sent: &[u32]| silent == Some((place, sent[place]));
+            let mut is_moving = true;
+            while is_moving {
+                is_moving = false;
+                for me in 0..PLAYERS {
+                    let peers: Vec<SearchPeer<'_>> = (0..PLAYERS)
+                        .map(|place| SearchPeer {
+                            said: &self.heard[me][place],
+                            is_gone: is_silent(place, &self.sent),
+                            is_presumed: false,
+                        })
+                        .collect();
+                    let agent = &self.agents[me];
+                    let can_step =
+                        peers.iter().all(|peer| peer.is_gone || agent.has_heard(peer.said));
+                    let is_over = agent.phase == SearchPhase::Over;
+                    if is_over || is_silent(me, &self.sent) || !can_step {
+                        continue;
+                    }
+                    is_moving = true;
+                    if let SearchStep::Send(message) = self.agents[me].step(&self.games[me], &peers)
+                    {
+                        self.send(me, &message);
+                    }
+                }
+            }
+            self.agents
+        }
+    }
+
+    #[test]
+    fn agents_that_know_their_own_pairs_come_to_what_one_process_finds_for_all() {
+        let all = game(|_, _| true);
+        let neighbors = (0..PLAYERS).map(|player| all.neighbors(player).collect()).collect();
+        let all_starts: Vec<Vec<usize>> = (0..PLAYERS).map(starts).collect();
+        let mut descents = Descents::new(neighbors, &all_starts);
+        while descents.count_open() > 0 {
+            for player in 0..PLAYERS {
+                let costs = descents.player_costs(&all, player);
+                descents.set_player_costs(player, costs);
+            }
+            let moves: Vec<_> =
+                (0..PLAYERS).map(|player| descents.player_moves(&all, player)).collect();
+            descents.step(&moves);
+        }
+        let joint = descents.best_joint();
+        assert_ne!(joint, descents.first_joint(), "something was to be found");
+        for (me, agent) in Group::new().run(None).iter().enumerate() {
+            let (action, costs) = agent.end().expect("an end");
+            assert_eq!((action, costs), (joint[me], descents.best_costs_given(me)));
+            let bound = all.lower_bound();
+            assert_eq!(agent.reached(), Some(ReachedCost { cost: all.cost(joint), bound }));
+        }
+    }
+
+    #[test]
+    fn whoever_falls_silent_ends_the_search_of_all_and_nobody_waits() {
+        for after in 1..6 {
+            for agent in Group::new().run(Some((2, after))) {
+                if agent.me != 2 {
+                    assert_eq!(agent.phase, SearchPhase::Over, "after {after} messages");
+                    assert!(agent.end().is_none() && agent.reached().is_none());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn messages_with_impossible_content_are_refused() {
+        let limits = SearchLimits { actions: &[4, 4, 4], starts: 2, max_step: 3 };
+        let start = |actions: &[u32], neighbors: &[u32]| {
+            SearchMessage::Start(SearchStart {
+                actions: actions.to_vec(),
+                neighbors: neighbors.to_vec(),
+            })
+        };
+        let costs = |step: u32, number: usize, cost: f64| SearchMessage::Costs {
+            step,
+            costs: vec![PlayerCosts { cost, given: vec![cost; 4] }; number],
+        };
+        let moves = |gain: f64, strategy: usize, partner: Option<(usize, usize)>| {
+            let offer = PairMove { gain, strategy, partner };
+            SearchMessage::Moves { step: 0, moves: vec![Some(offer), None] }
+        };
+        let bound = |cost: f64| SearchMessage::Bound(SearchBound { cost, bound: 0.0 });
+        for right in [
+            start(&[3, 0], &[0, 2]),
+            costs(3, 2, 1.0),
+            moves(1.0, 3, Some((2, 3))),
+            moves(0.0, 0, None),
+            bound(2.0),
+        ] {
+            assert_eq!(right.check(1, &limits), Ok(()), "{right:?}");
+        }
+        for wrong in [
+            start(&[3], &[]),
+            start(&[4, 0], &[]),
+            start(&[0, 0], &[1]),
+            start(&[0, 0], &[2, 0]),
+            start(&[0, 0], &[3]),
+            costs(4, 2, 1.0),
+            costs(0, 3, 1.0),
+            costs(0, 2, f64::NAN),
+            costs(0, 2, -1.0),
+            SearchMessage::Costs { step: 0, costs: vec![PlayerCosts::default()] },
+            moves(f64::INFINITY, 0, None),
+            moves(1.0, 4, None),
+            moves(1.0, 0, Some((0, 0))),
+            moves(1.0, 0, Some((1, 0))),
+            moves(1.0, 0, Some((3, 0))),
+            moves(1.0, 0, Some((2, 4))),
+            bound(f64::NAN),
+        ] {
+            assert!(wrong.check(1, &limits).is_err(), "{wrong:?}");
+        }
+    }
 }
