@@ -64,7 +64,8 @@ struct Descent {
     touched: Vec<bool>,
     /// The step in which each player has moved or its costs have changed last.
     changed_in: Vec<u32>,
-    /// What each player and each of its neighbors can save by moving together.
+    /// What each player and each of its neighbors can save by moving together; empty before it is asked for, because an
+    /// agent asks for itself alone.
     pair_gains: Vec<Vec<PairGain>>,
     is_settled: bool,
 }
@@ -100,8 +101,6 @@ impl Descents {
     /// with which it shares a cost (shape: players, neighbors).
     pub fn new(neighbors: Vec<Vec<usize>>, starts: &[Vec<usize>]) -> Self {
         let count = starts.iter().map(Vec::len).min().unwrap_or(0);
-        let unknown_gains: Vec<Vec<PairGain>> =
-            neighbors.iter().map(|others| vec![PairGain::UNKNOWN; others.len()]).collect();
         let descents = (0..count).map(|start| Descent {
             joint: starts.iter().map(|strategies| strategies[start]).collect(),
             players: vec![PlayerCosts::default(); starts.len()],
@@ -109,7 +108,7 @@ impl Descents {
             gains_alone: vec![None; starts.len()],
             touched: vec![true; starts.len()],
             changed_in: vec![0; starts.len()],
-            pair_gains: unknown_gains.clone(),
+            pair_gains: vec![Vec::new(); starts.len()],
             is_settled: false,
         });
         Self { descents: descents.collect(), neighbors, steps: 0 }
@@ -212,7 +211,7 @@ impl Descents {
         }
     }
 
-    /// Returns the first start, before the first step.
+    /// Returns the joint move of the first descent: the first start, before the first step.
     ///
     /// # Panics
     /// Without a start.
@@ -278,7 +277,8 @@ impl Descent {
         self.gains_alone[player] = (gain > MIN_SAVED_SHARE * now.abs()).then_some(gain);
     }
 
-    /// Returns the move of a player that saves most, or else of it and a later neighbor; `None` if none does. `neighbors` are those of the player.
+    /// Returns the move of a player that saves most, or else of it and a later neighbor; `None` if none does. `neighbors`
+    /// are those of the player.
     fn best_move(
         &mut self,
         game: &PairwiseGame,
@@ -294,6 +294,7 @@ impl Descent {
         if neighbors.iter().any(|&neighbor| self.gains_alone[neighbor].is_some()) {
             return None;
         }
+        self.pair_gains[player].resize(neighbors.len(), PairGain::UNKNOWN);
         let mut best: Option<PairMove> = None;
         let first_later = neighbors.partition_point(|&other| other < player);
         for (place, &other) in neighbors.iter().enumerate().skip(first_later) {

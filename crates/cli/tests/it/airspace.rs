@@ -180,20 +180,19 @@ fn seeds_that_run_over_are_told_as_such() {
 }
 
 #[test]
-fn the_advice_to_fly_methods_without_the_shield_is_accepted() {
+fn methods_are_compared_with_and_without_the_shield_where_there_is_one() {
     let place = TestFolder::new();
     place.write("six.toml", SIX);
     let compare = ["compare", "six.toml", "--methods", "none", "--runs", "1"];
-    let words = |args: &[&str]| {
-        let told = place.run(args);
-        assert_eq!(told.code(), 0, "{}", told.err());
-        told.out().split_whitespace().collect::<Vec<_>>().join(" ")
-    };
-    let told = words(&compare);
-    let advice = told.split_once("Fly the methods bare with --set ").expect("an advice").1;
-    let setting = advice.split(' ').next().and_then(|word| word.strip_suffix('.'));
-    let bare = words(&[&compare[..], &["--set", setting.expect("a sentence")]].concat());
-    assert!(!bare.contains("The shield changed"), "{bare}");
+    let told = &place.json(&compare)["methods"][0];
+    assert_eq!([&told["loss_free"], &told["bare"]["loss_free"]], [1, 0]);
+    assert_eq!(told["bare"]["delay_percent"]["mean"], 0.0, "without it they fly straight on");
+    assert_eq!(told["bare"]["price_percent"]["mean"], told["delay_percent"]["mean"]);
+    let shielded = place.run(&compare).out();
+    assert!(shielded.contains("bare: losses"), "{shielded}");
+    let without = [&compare[..], &["--set", "airspace.shield=off"]].concat();
+    assert_eq!(place.json(&without)["methods"][0]["bare"], Value::Null);
+    assert!(!place.run(&without).out().contains("bare"));
 }
 
 #[test]
