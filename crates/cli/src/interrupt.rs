@@ -58,7 +58,7 @@ static HAS_HANDLER: AtomicBool = AtomicBool::new(false);
 
 fn set_handler(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
     *HANDLER.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(handler));
-    if HAS_HANDLER.swap(true, Ordering::Relaxed) {
+    if HAS_HANDLER.load(Ordering::Relaxed) {
         return Ok(());
     }
     let handle = || {
@@ -68,7 +68,9 @@ fn set_handler(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
     };
     ctrlc::set_handler(handle).map_err(|e| {
         Failure::other(format!("cannot listen for Ctrl-C: {e}"), "run it in another terminal")
-    })
+    })?;
+    HAS_HANDLER.store(true, Ordering::Relaxed);
+    Ok(())
 }
 
 pub(crate) fn is_requested() -> bool {

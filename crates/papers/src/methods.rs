@@ -45,13 +45,19 @@ pub struct MethodResult {
     pub bytes: Estimate,
     /// Decisions that the shield changed, per run.
     pub shield_overrides: Estimate,
-    /// The same traffic without the shield; absent where the scenario has none.
+    /// Whether the shield flew with the method.
+    pub is_shielded: bool,
+    /// The same traffic without the shield; absent where the scenario has none, or is not valid without it.
     pub bare: Option<BareResult>,
 }
 
 /// Results of a method without the shield, beside those with it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BareResult {
+    /// Runs without the shield.
+    pub runs: usize,
+    /// The effect of another seed on them, which may differ from that with the shield.
+    pub seeds: SeedEffect,
     /// Runs without any loss of separation.
     pub loss_free: usize,
     /// Losses of separation per run.
@@ -109,12 +115,13 @@ impl Comparison<'_> {
                 Some(bare) => {
                     let runs = MethodRuns { source: &bare, ..runs };
                     let name = format!("{} without the shield", method.name());
-                    Some(runs.run_seeds(self.seeds, |share| progress(&name, share))?.1)
+                    Some(runs.run_seeds(self.seeds, |share| progress(&name, share))?)
                 }
                 None => None,
             };
             let mut result = method_result(method.name(), effect, &metrics);
-            result.bare = bare.map(|bare| bare_result(&metrics, &bare));
+            result.is_shielded = CompiledAirspace::new(&source)?.world.shield;
+            result.bare = bare.map(|(effect, bare)| bare_result(effect, &metrics, &bare));
             results.push(result);
         }
         Ok(results)
@@ -214,15 +221,20 @@ fn method_result(method: &'static str, seeds: SeedEffect, all: &[Metrics]) -> Me
         messages: mean(all, |m| Some(m.messages as f64)),
         bytes: mean(all, |m| Some(m.bytes as f64)),
         shield_overrides: mean(all, |m| Some(m.shield_overrides as f64)),
+        is_shielded: false,
         bare: None,
     }
 }
 
 /// Returns the results of runs without the shield beside those with it.
-fn bare_result(shielded: &[Metrics], bare: &[Metrics]) -> BareResult {
-    let pairs = shielded.iter().zip(bare);
-    let prices = pairs.map(|(on, off)| Some(on.mean_delay_percent? - off.mean_delay_percent?));
+fn bare_result(seeds: SeedEffect, shielded: &[Metrics], bare: &[Metrics]) -> BareResult {
+    // Where seeds change nothing on one side, its one run stands for all.
+    let of_seed = |all: &[Metrics], k: usize| all.get(k).or(all.first())?.mean_delay_percent;
+    let prices = (0..shielded.len().max(bare.len()))
+        .map(|k| Some(of_seed(shielded, k)? - of_seed(bare, k)?));
     BareResult {
+        runs: bare.len(),
+        seeds,
         loss_free: bare.iter().filter(|m| m.losses_of_separation == 0).count(),
         losses: mean(bare, |m| Some(m.losses_of_separation as f64)),
         delay_percent: mean(bare, |m| m.mean_delay_percent),
@@ -253,25 +265,36 @@ pub fn table(title: &str, results: &[MethodResult]) -> Table {
         ("method", &|r| r.method.to_string()),
         ("runs without loss", &|r| format_loss_free(r)),
         ("bare: runs without loss", &|r| {
-            format_bare(r, |bare| format!("{}/{}", bare.loss_free, r.runs))
+            format_bare(r, |bare| format!("{}/{}", bare.loss_free, bare.runs))
         }),
-        ("losses", &|r| format_mean(r, &r.losses)),
-        ("bare: losses", &|r| format_bare(r, |bare| format_mean(r, &bare.losses))),
-        ("delay, %", &|r| format_mean(r, &r.delay_percent)),
-        ("bare: delay, %", &|r| format_bare(r, |bare| format_mean(r, &bare.delay_percent))),
-        ("by the shield, %", &|r| format_bare(r, |bare| format_mean(r, &bare.price_percent))),
-        ("changed by the shield", &|r| format_mean(r, &r.shield_overrides)),
+        ("losses", &|r| format_mean(r.seeds, &r.losses)),
+        ("bare: losses", &|r| format_bare(r, |bare| format_mean(bare.seeds, &bare.losses))),
+        ("delay, %", &|r| format_mean(r.seeds, &r.delay_percent)),
+        ("bare: delay, %", &|r| {
+            format_bare(r, |bare| format_mean(bare.seeds, &bare.delay_percent))
+        }),
+        ("by the shield, %", &|r| {
+            format_bare(r, |bare| {
+                // A difference depends on seeds if either side does.
+                let seeds = if r.runs > 1 { r.seeds } else { bare.seeds };
+                format_mean(seeds, &bare.price_percent)
+            })
+        }),
+        ("changed by the shield", &|r| format_mean(r.seeds, &r.shield_overrides)),
         ("nearest of all runs, m", &|r| {
             r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}"))
         }),
-        ("arrived", &|r| format_mean(r, &r.arrived)),
-        ("deciding, s", &|r| format_mean(r, &r.optimize_cpu_s)),
-        ("messages", &|r| format_mean(r, &r.messages)),
-        ("bytes", &|r| format_mean(r, &r.bytes)),
+        ("arrived", &|r| format_mean(r.seeds, &r.arrived)),
+        ("deciding, s", &|r| format_mean(r.seeds, &r.optimize_cpu_s)),
+        ("messages", &|r| format_mean(r.seeds, &r.messages)),
+        ("bytes", &|r| format_mean(r.seeds, &r.bytes)),
     ];
     // Without a shield all runs are bare.
     if results.iter().all(|result| result.bare.is_none()) {
-        columns.retain(|(head, _)| !head.starts_with("bare: ") && !head.contains("by the shield"));
+        columns.retain(|(head, _)| !head.starts_with("bare: ") && *head != "by the shield, %");
+    }
+    if !results.iter().any(|result| result.is_shielded) {
+        columns.retain(|(head, _)| *head != "changed by the shield");
     }
     case_results::table(title, table_note(results), results, &columns)
 }
@@ -290,8 +313,8 @@ fn format_loss_free(result: &MethodResult) -> String {
 }
 
 /// Returns a mean over runs; the number alone where there is one.
-fn format_mean(result: &MethodResult, estimate: &Estimate) -> String {
-    match (result.seeds, estimate.mean) {
+fn format_mean(seeds: SeedEffect, estimate: &Estimate) -> String {
+    match (seeds, estimate.mean) {
         (SeedEffect::Nothing | SeedEffect::Perhaps, Some(mean)) => format_short(mean),
         _ => estimate.to_string(),
     }
@@ -299,6 +322,13 @@ fn format_mean(result: &MethodResult, estimate: &Estimate) -> String {
 
 /// Returns the sentence without which the actions of the shield would pass for those of a method.
 fn shield_note(results: &[MethodResult]) -> Option<String> {
+    if results.iter().any(|result| result.is_shielded && result.bare.is_none()) {
+        return Some(
+            "The shield flew with every method, and is part of each result: with airspace.shield=off this scenario is not \
+             valid, so that no method is flown alone."
+                .into(),
+        );
+    }
     results.iter().any(|result| result.bare.is_some()).then(|| {
         "Columns with \"bare\" are of the same traffic without the shield, by the method alone; what the shield adds to the \
          delay is the mean difference, run by run."
@@ -398,7 +428,7 @@ mod tests {
         let source = Source::new("four", text, "");
         let results = compare(&source, &[BuiltInMethod::None], 2);
         let bare = results[0].bare.as_ref().expect("a shield to do without");
-        assert_eq!((results[0].loss_free, bare.loss_free), (2, 0));
+        assert_eq!((results[0].loss_free, bare.loss_free, bare.runs), (2, 0, 2));
         assert_eq!(bare.delay_percent.mean, Some(0.0), "without it they fly straight on");
         assert_eq!(bare.price_percent.mean, results[0].delay_percent.mean);
         let table = table("t", &results);
