@@ -8,6 +8,8 @@ mod optima_tests;
 mod preferences;
 mod velocity;
 
+pub(crate) use velocity::TrafficView;
+
 use super::agents::network_traffic::NetworkTraffic;
 use super::agents::{ActionChoice, ReachedCost};
 use super::baseline::mvp::ActiveResolutions;
@@ -190,6 +192,30 @@ pub(super) fn candidates_by_velocity(
     profiles.into_iter().map(ManeuverCandidates::from_profiles).collect()
 }
 
+/// Returns the candidates of the airplanes of a group by the world's method, each with the knowledge of all. `memory` are
+/// the conflicts that they resolve.
+pub(super) fn candidates_for_group(
+    world: &AirspaceWorld,
+    group: &[KnownAircraft],
+    non_cooperative: &[NonCooperativeAircraft],
+    memory: &mut [ActiveResolutions],
+    now: Cycle,
+) -> Vec<ManeuverCandidates> {
+    match DecisionStrategy::for_group(world, group, non_cooperative.len()) {
+        DecisionStrategy::Independent | DecisionStrategy::GroupTooLarge => {
+            group.iter().map(|known| candidates_alone(world, *known, None)).collect()
+        }
+        DecisionStrategy::Reactive => {
+            candidates_by_velocity(world, group, non_cooperative, memory, now)
+        }
+        DecisionStrategy::Joint => {
+            let decided = decide_centrally(world, group, non_cooperative, now);
+            let all = group.iter().zip(decided);
+            all.map(|(known, decided)| candidates_from_choice(world, *known, decided)).collect()
+        }
+    }
+}
+
 /// Returns all the different turn profiles of the next `dt` that the actions of an airplane have.
 pub(super) fn possible_profiles(world: &AirspaceWorld, known: KnownAircraft) -> Vec<TurnProfile> {
     preferences::turn_profiles_from_actions(world, known, world.actions(known.slot))
@@ -210,9 +236,10 @@ pub(super) fn decide_centrally(
 ) -> Vec<Option<ActionChoice>> {
     let mut ids = Vec::new();
     let mut options = Vec::new();
-    for known in group {
+    for (known, weight) in group.iter().zip(world.deviation_weights(group)) {
         ids.push(known.slot);
-        options.push(world.action_predictions(*known, non_cooperative));
+        let predictions = world.action_predictions(*known, non_cooperative);
+        options.push(predictions.with_deviation_weight(weight));
     }
     decide_by_predictions(world, &ids, &options, now).into_iter().map(Some).collect()
 }
@@ -234,8 +261,14 @@ pub(super) fn joint_action_cost(
     non_cooperative: &[NonCooperativeAircraft],
     joint: &[usize],
 ) -> JointActionCost {
-    let options: Vec<ActionPredictions> =
-        group.iter().map(|known| world.action_predictions(*known, non_cooperative)).collect();
+    let weights = world.deviation_weights(group);
+    let options: Vec<ActionPredictions> = group
+        .iter()
+        .zip(weights)
+        .map(|(known, weight)| {
+            world.action_predictions(*known, non_cooperative).with_deviation_weight(weight)
+        })
+        .collect();
     let game = build_group_game(&world.objective, &options);
     let minimum = find_minimum(&game, joint, MAX_MINIMUM_NODES).map(|minimum| minimum.cost);
     JointActionCost {

@@ -165,8 +165,9 @@ impl AirspaceWorld {
 
     /// Checks that an airplane can fly a maneuver.
     fn check_maneuver(&self, percept: &Percept, maneuver: &Maneuver) -> Result<(), String> {
-        let Maneuver::Profile { candidate, profile: TurnProfile { omegas_rad_s }, fallback } =
-            maneuver
+        let Maneuver::Profile {
+            candidate, profile: TurnProfile { omegas_rad_s }, fallback, ..
+        } = maneuver
         else {
             return Ok(());
         };

@@ -10,7 +10,7 @@ use super::settings::{SeparationM, Speed, TurnCount, TurnRate};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
-use sidestep_scenario::{Closed, FixedList, LeftOpen, Number, Point, Source, Spanned};
+use sidestep_scenario::{Closed, FixedList, Integer, LeftOpen, Number, Point, Source, Spanned};
 use std::ops::Range;
 
 /// Rate at which levels are changed when an order does not give one: 1500 ft/min.
@@ -54,6 +54,8 @@ pub(super) struct AirplaneSection {
     pub(super) separation_m: Option<SeparationM>,
     /// Number of turn rates to choose from, if not that of all.
     pub(super) turns: Option<TurnCount>,
+    /// Priority from 0 to 3: it has right of way over airplanes with a smaller one.
+    pub(super) priority: Option<Integer<0, 3>>,
     non_cooperative: Option<bool>,
     /// Earlier name of non_cooperative.
     intruder: Option<Spanned<bool>>,

@@ -62,6 +62,7 @@ fn airplane(params: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airpla
         orders: Vec::new(),
         track: None,
         is_non_cooperative: false,
+        priority: 0,
     }
 }
 

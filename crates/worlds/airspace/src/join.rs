@@ -53,8 +53,22 @@ impl CooperativeGroup {
                     .filter(|one| self.can_see(k, one.slot))
                     .cloned()
                     .collect(),
+                exempt_pairs: self.exempt_pairs(context),
             })
             .collect()
+    }
+
+    /// Returns the exempt pairs among them, where all see all.
+    fn exempt_pairs(&self, context: &PhaseContext<'_>) -> Vec<[EntitySlot; 2]> {
+        if !context.world.has_common_plans() {
+            return Vec::new();
+        }
+        let mut pairs = Vec::new();
+        for &a in &self.ids {
+            let exempt = context.state.exempt_ids(a);
+            pairs.extend(exempt.iter().filter(|&&b| a < b).map(|&b| [a, b]));
+        }
+        pairs
     }
 
     /// Returns whether the `k`-th of them sees another airplane of the group.

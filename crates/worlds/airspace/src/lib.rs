@@ -44,6 +44,7 @@ pub mod objective;
 mod perceive;
 pub mod pilot;
 mod purpose;
+mod right_of_way;
 mod rows;
 pub mod scenario;
 mod scratch;

@@ -134,6 +134,8 @@ pub struct ActionPredictions {
     pub separation_m: f64,
     /// The levels that the airplane occupies.
     pub levels: FlightLevelRange,
+    /// Factor on the cost of deviations: more than 1 for an airplane that has right of way.
+    deviation_weight: f64,
     /// Costs of the actions beside non-cooperative aircraft; empty where there are none.
     non_cooperative_costs: Vec<f64>,
     slices: Vec<TimeSlice>,
@@ -153,8 +155,22 @@ impl ActionPredictions {
         let slices: Vec<TimeSlice> =
             (0..max_points).step_by(SLICE).map(|from| TimeSlice::new(&predictions, from)).collect();
         let reach_m = slices.iter().map(|slice| slice.all.reach_m()).fold(0.0, f64::max);
-        let non_cooperative_costs = Vec::new();
-        Self { predictions, frame, separation_m, levels, non_cooperative_costs, slices, reach_m }
+        Self {
+            predictions,
+            frame,
+            separation_m,
+            levels,
+            deviation_weight: 1.0,
+            non_cooperative_costs: Vec::new(),
+            slices,
+            reach_m,
+        }
+    }
+
+    /// Returns the same options with a factor on the cost of deviations.
+    #[must_use]
+    pub(crate) fn with_deviation_weight(self, deviation_weight: f64) -> Self {
+        Self { deviation_weight, ..self }
     }
 
     /// Returns the same options beside non-cooperative aircraft, seen at each point of the predictions.
@@ -301,10 +317,11 @@ pub fn build_group_game(objective: &Objective, group: &[ActionPredictions]) -> P
 /// Returns the sum of `alpha Gdev` of every action and its cost beside non-cooperative aircraft.
 pub(super) fn own_costs(objective: &Objective, options: &ActionPredictions) -> Vec<f64> {
     let optimal = options.predictions.last().expect("every airplane has an optimal action");
+    let alpha = objective.alpha * options.deviation_weight;
     let mut costs: Vec<f64> = options
         .predictions
         .iter()
-        .map(|prediction| objective.alpha * objective.deviation_cost(prediction, optimal))
+        .map(|prediction| alpha * objective.deviation_cost(prediction, optimal))
         .collect();
     for (cost, further) in costs.iter_mut().zip(&options.non_cooperative_costs) {
         *cost += further;

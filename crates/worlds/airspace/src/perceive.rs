@@ -2,7 +2,7 @@
 
 use super::flight::{FlightLevelRange, KnownAircraft, Pose2};
 use super::non_cooperative::NonCooperativeAircraft;
-use super::pilot::{OwnshipState, SurveillanceReport};
+use super::pilot::{OwnshipState, SurveillanceReport, TrackedState};
 use super::purpose;
 use super::scratch::PhaseContext;
 use super::state::AirspaceState;
@@ -95,6 +95,8 @@ pub(super) fn surveillance_report(
         pose: observed_pose(world, slot, now, current.pose()),
         altitude_m: current.altitude_m.get(),
         orbit: (current.orbiting.get() > 0).then(|| current.fallback.get().orbit_side),
+        tracked: (world.has_common_plan(slot) && current.tracked.get() > 0)
+            .then(|| TrackedState { next: current.next.get(), fallback: current.fallback.get() }),
     }
 }
 

@@ -15,7 +15,8 @@ use super::flight_plan::AirplaneSection;
 use super::method::Methods;
 use super::settings::{
     BuiltInMethod, Cooling, Decision, Deployment, Fading, Gibibytes, Grouping, HeadingNoise,
-    Inflation, LevelGap, LookAhead, RecordSection, RoundCount, Step, Tolerance, Weight,
+    Inflation, LevelGap, LookAhead, RecordSection, RightOfWayRule, RoundCount, Step, Tolerance,
+    Weight,
 };
 use super::shield::Fallback;
 use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
@@ -73,6 +74,9 @@ struct AirspaceSection {
     shield: OnOffSwitch,
     deployment: Deployment,
     groups: Option<Spanned<Grouping>>,
+    /// The rule by which airplanes of one priority give way to each other.
+    #[serde(default)]
+    right_of_way: RightOfWayRule,
     network: Option<Spanned<NetworkSection>>,
     generator: Option<Spanned<GeneratorSection>>,
     dt_s: Option<Spanned<Number<Decision>>>,
@@ -225,7 +229,10 @@ impl CompiledAirspace {
             .airplanes
             .iter()
             .zip(&*self.fallbacks)
-            .map(|(airplane, &fallback)| initial_airplane_record(airplane, fallback))
+            // First fallbacks follow from what is filed and seen.
+            .map(|(airplane, &fallback)| {
+                initial_airplane_record(airplane, fallback, self.world.has_common_plans())
+            })
             .collect();
         Snapshot {
             cycle: 0,
@@ -241,12 +248,17 @@ impl CompiledAirspace {
 }
 
 /// Returns the state of an airplane at the start of its flight.
-fn initial_airplane_record(airplane: &AirplaneStart, fallback: Fallback) -> AirplaneSnapshot {
+fn initial_airplane_record(
+    airplane: &AirplaneStart,
+    fallback: Fallback,
+    is_tracked: bool,
+) -> AirplaneSnapshot {
     AirplaneSnapshot {
         pose: airplane.start,
         ended: PackedFlightEnd::NONE,
         counts: [0; 4],
         fallback,
+        is_tracked,
         altitude_m: match &airplane.track {
             Some(track) => track.altitude_at_m(airplane.appears_s),
             None => airplane.altitude_m,

@@ -64,6 +64,17 @@ pub enum Grouping {
     Heard,
 }
 
+/// A rule by which airplanes of one priority give way to each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RightOfWayRule {
+    /// All avoid each other.
+    #[default]
+    None,
+    /// Of two that converge the one that has the other on its right gives way, and one that overtakes does.
+    RulesOfTheAir,
+}
+
 /// The settings of a method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReactiveSettings {

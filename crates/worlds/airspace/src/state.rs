@@ -80,6 +80,8 @@ pub struct AirplaneState {
     pub waits: AtomicCell<u16>,
     /// The stored fallback.
     pub fallback: AtomicCell<Fallback>,
+    /// Whether all know the stored fallback who have watched its flight: 1, or else 0.
+    pub tracked: AtomicCell<u16>,
 }
 
 /// A pose on an orbit, in cells, so that workers can store those of their groups at the same time.
@@ -112,6 +114,7 @@ impl AirplaneState {
         self.orbits.set(orbits);
         self.orbiting.set(orbiting);
         self.fallback.set(record.fallback);
+        self.tracked.set(record.is_tracked.into());
         self.altitude_m.set(record.altitude_m);
         let [orders, waits] = record.orders;
         self.orders.set(orders);
@@ -124,6 +127,7 @@ impl AirplaneState {
             ended: self.end.get(),
             counts: [self.next.get(), self.overrides.get(), self.orbits.get(), self.orbiting.get()],
             fallback: self.fallback.get(),
+            is_tracked: self.tracked.get() > 0,
             altitude_m: self.altitude_m.get(),
             orders: [self.orders.get(), self.waits.get()],
             turn_rate_rad_s,

@@ -13,7 +13,7 @@ use super::flight::{
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, Objective};
-use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings};
+use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings, RightOfWayRule};
 use super::shield::{ErrorBounds, Fallback, OrbitSide, common_orbit_rates, curvature_error_m};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::AgentTeams;
@@ -57,6 +57,10 @@ pub struct AirspaceWorld {
     pub group_bytes: u64,
     /// Whether the shield filters decisions.
     pub shield: bool,
+    /// The rule by which airplanes of one priority give way.
+    pub right_of_way: RightOfWayRule,
+    /// Whether some airplane may have right of way over another one.
+    pub(crate) uses_right_of_way: bool,
     /// Airplanes at least this many meters above each other need not avoid each other. It is
     /// slightly less than the scenario asks for, so that levels in feet are apart when they are
     /// nominally so.
@@ -144,6 +148,7 @@ impl AirspaceWorld {
     /// no seed draws, are shared with the same world of another seed.
     #[must_use]
     pub(crate) fn with_derived_fields(mut self, known: Option<&Self>) -> Self {
+        self.uses_right_of_way = self.may_have_right_of_way();
         self.later = Arc::new(self.airplanes.iter().map(segments_after_orders).collect());
         if let Some(known) = known {
             self.actions = Arc::clone(&known.actions);
@@ -191,8 +196,9 @@ impl AirspaceWorld {
     /// Returns the fallbacks that the plans of an airplane may end with.
     fn fallback_choices(&self, i: usize) -> Arc<[Fallback]> {
         // Without the shield none is flown, and groups should not depend on them. Where messages get lost, airplanes have
-        // to know the path of one that they cannot hear: they see on which side it orbits.
-        if !self.shield || self.network.is_some() {
+        // to know the path of one that they cannot hear: they see on which side it orbits, unless they can compute more.
+        let must_be_seen = self.network.is_some() && !self.has_common_plan(i as EntitySlot);
+        if !self.shield || must_be_seen {
             return OrbitSide::BOTH.map(Fallback::from_side).into();
         }
         let radius_s = 1.0 / self.orbit_rad_s[i];
@@ -201,6 +207,21 @@ impl AirspaceWorld {
         let max_lead_s = (look_ahead_s - self.timing.dt_s - 2.0 * radius_s).max(radius_s);
         let model = &self.airplanes[i].model;
         Fallback::choices(model, self.orbit_rad_s[i], self.timing.dt_s, max_lead_s)
+    }
+
+    /// Returns whether airplanes compute plans for each other from what all see: where messages get lost, all see the same,
+    /// and nothing that cannot be seen decides. A gust takes an airplane off its fallback by what nobody else knows.
+    pub(crate) fn has_common_plans(&self) -> bool {
+        self.network.is_some()
+            && self.shield
+            && self.groups == Grouping::Announced
+            && self.bounds.heading_rad == 0.0
+            && !matches!(self.method, MethodKind::External)
+    }
+
+    /// Returns whether all can compute a plan for an airplane. Orders are not filed: only the airplane knows of them.
+    pub(crate) fn has_common_plan(&self, slot: EntitySlot) -> bool {
+        self.has_common_plans() && self.airplanes[slot as usize].orders.is_empty()
     }
 
     /// Returns how far an airplane gets within one `dt`, and on a fallback after it, in meters.

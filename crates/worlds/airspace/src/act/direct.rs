@@ -1,16 +1,15 @@
 //! One process that decides for all airplanes of a group.
 
 use crate::avoid::NonCooperativeAvoidance;
-use crate::decide::{
-    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_velocity,
-    candidates_from_choice, decide_centrally,
-};
+use crate::decide::{DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_for_group};
 use crate::events::{Event, EventKind};
 use crate::flight::KnownAircraft;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OptimizationStatus, OwnshipState, PilotMemory};
 use crate::scratch::PhaseContext;
-use crate::shield::{PlanCertainty, PlanRules, ShieldedAircraft, TurnProfile, filter_maneuvers};
+use crate::shield::{
+    PlanCertainty, PlanEnding, PlanRules, ShieldedAircraft, TurnProfile, filter_maneuvers,
+};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{Cycle, EntitySlot};
 
@@ -56,13 +55,8 @@ fn find_candidates(
                 candidates_alone(world, own.as_known_aircraft(), own.external_action.as_ref())
             })
             .collect(),
-        DecisionStrategy::Reactive => {
-            decide_reactively(world, &group, non_cooperative, &mut memories, now)
-        }
-        DecisionStrategy::Joint => {
-            let decided = decide_centrally(world, &group, non_cooperative, now);
-            let all = group.iter().zip(decided);
-            all.map(|(known, decided)| candidates_from_choice(world, *known, decided)).collect()
+        DecisionStrategy::Reactive | DecisionStrategy::Joint => {
+            decide_together(world, &group, non_cooperative, &mut memories, now)
         }
     };
     let mut controls: Vec<AirplaneControl> = slots
@@ -84,8 +78,8 @@ fn find_candidates(
     controls.into_iter().zip(considered).collect()
 }
 
-/// Returns the candidates of the airplanes of a group by a method that gives them headings.
-fn decide_reactively(
+/// Returns the candidates of the airplanes of a group by a method that considers all of them.
+fn decide_together(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
     non_cooperative: &[NonCooperativeAircraft],
@@ -94,7 +88,7 @@ fn decide_reactively(
 ) -> Vec<ManeuverCandidates> {
     let mut resolving: Vec<_> =
         memories.iter_mut().map(|memory| std::mem::take(&mut memory.resolving)).collect();
-    let candidates = candidates_by_velocity(world, group, non_cooperative, &mut resolving, now);
+    let candidates = candidates_for_group(world, group, non_cooperative, &mut resolving, now);
     for (memory, resolving) in memories.iter_mut().zip(resolving) {
         memory.resolving = resolving;
     }
@@ -104,7 +98,7 @@ fn decide_reactively(
 /// Returns the maneuver of an airplane that flies its first candidate.
 fn unshielded_maneuver(own: &OwnshipState, considered: &ManeuverCandidates) -> Maneuver {
     let profile = considered.profiles.first().cloned().unwrap_or_default();
-    Maneuver::Profile { candidate: 0, profile, fallback: own.fallback }
+    Maneuver::Profile { candidate: 0, profile, fallback: own.fallback, is_common: false }
 }
 
 /// Returns the maneuvers that the shield allows to the airplanes of a group.
@@ -126,7 +120,8 @@ fn shielded_maneuvers(
     }
     let steps = world.timing.points_per_dt();
     // In one process no message gets lost, so all fly the plans that they are given.
-    let rules = PlanRules { steps, dtau_s, certainty: PlanCertainty::Sure };
+    let ending = PlanEnding::AnyFallback;
+    let rules = PlanRules { steps, dtau_s, certainty: PlanCertainty::Sure, ending };
     let decisions = filter_maneuvers(&group, &profiles, rules);
     let decided = decisions.into_iter().zip(&allowed).zip(all);
     decided

@@ -8,7 +8,7 @@
 
 use super::protect::shielded_aircraft;
 use crate::scratch::PhaseContext;
-use crate::shield::{ShieldedAircraft, entry_fallbacks};
+use crate::shield::{Fallback, OrbitSide, ShieldedAircraft, entry_fallbacks};
 use sidestep_kernel::EntitySlot;
 
 /// Ends the exemption of pairs that are safe by now. `flown` are the group's airplanes that the method
@@ -53,11 +53,22 @@ pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySl
     if !is_entering.contains(&true) {
         return;
     }
-    let group: Vec<ShieldedAircraft> =
+    let mut group: Vec<ShieldedAircraft> =
         flown.iter().map(|&slot| shielded_aircraft(context, slot)).collect();
+    if world.network.is_some() {
+        // Others reckon with orbits of one that has just entered.
+        for one in &mut group {
+            one.choices = OrbitSide::BOTH.map(Fallback::from_side).into();
+        }
+    }
     let (fallbacks, too_close) = entry_fallbacks(&group, |i| is_entering[i]);
-    for (&slot, fallback) in flown.iter().zip(fallbacks) {
-        state.airplanes[slot as usize].fallback.set(fallback);
+    for (k, (&slot, fallback)) in flown.iter().zip(fallbacks).enumerate() {
+        let current = &state.airplanes[slot as usize];
+        current.fallback.set(fallback);
+        if is_entering[k] {
+            // It depends on fallbacks of others that not all need know.
+            current.tracked.set(0);
+        }
     }
     for (i, j) in too_close {
         state.exempt_pair(flown[i], flown[j]);

@@ -56,11 +56,12 @@ pub(super) fn store_maneuver(
     if *maneuver == Maneuver::Orbit {
         advance_orbit_pose(context, slot);
     }
-    let &mut PhaseContext { state, now, ref mut scratch, .. } = context;
+    let &mut PhaseContext { world, state, now, ref mut scratch, .. } = context;
     let current = &state.airplanes[slot as usize];
     match *maneuver {
-        Maneuver::Profile { candidate, fallback, .. } => {
+        Maneuver::Profile { candidate, fallback, is_common, .. } => {
             current.fallback.set(fallback);
+            current.tracked.set(is_common.into());
             current.orbiting.set(0);
             if candidate > 0 {
                 current.overrides.set(current.overrides.get() + 1);
@@ -73,6 +74,8 @@ pub(super) fn store_maneuver(
             current.orbits.set(current.orbits.get() + 1);
             current.orbiting.set(current.orbiting.get() + 1);
             current.fallback.set(current.fallback.get().after_cycle());
+            // All see it fly its fallback.
+            current.tracked.set(u16::from(world.has_common_plans()));
             scratch.events.push(Event::new(now, EventKind::Orbit, slot));
         }
     }

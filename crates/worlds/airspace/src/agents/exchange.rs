@@ -8,36 +8,44 @@
 //! safe whichever of them are flown, and no airplane flies one that others may not know:
 //!
 //! 1. Each airplane sends its *proposal* as above.
-//! 2. From the proposals it has heard each computes plans by [`filter_maneuvers`] that are *mixable*: each
-//!    plan keeps apart from every other one's plan and from its fallback too. An airplane that
-//!    was not heard counts as being on any orbit it may be on. Each sends its own *plan*.
-//! 3. Each *accepts* the plans of others that keep apart from its own plan and its own fallback,
+//! 2. From the proposals it has heard each computes plans by `filter_maneuvers_beside` that are *mixable*: each
+//!    plan keeps apart from every other one's plan, from its fallback, and from its common plan. An airplane that
+//!    was not heard counts as being on any orbit it may be on. Each sends its own *plan*, which ends with an orbit.
+//! 3. Each *accepts* the plans of others that keep apart from its own plan, its own fallback and its own common plan,
 //!    and sends the list of those it accepts.
 //! 4. Of two airplanes one *goes first* (`ShieldExchangeSetup::has_priority`). An airplane flies its plan if all
-//!    those that go before it have accepted it, else its fallback. It does not ask those that it
-//!    goes before, nor those from which its plan keeps apart in any case.
+//!    those that go before it have accepted it, else its common plan, or its fallback if it has none. It does not ask
+//!    those that it goes before, nor those from which its plan keeps apart in any case.
+//!
+//! *Common plans* need no message (`pilot/common_plans.rs`): all compute them for all airplanes of an announced group from
+//! what all see, and so they are known whether or not anybody is heard. They keep apart from each other, and from the
+//! fallbacks of all. An airplane that has one flies it rather than a plan of its own, and so stays predictable in
+//! the cycles to come.
 //!
 //! The order of going first follows from ids, time and visible state, and so both know it without a message. It
 //! cannot follow from anything that was heard: the other may not know that the one has heard it, and both might
 //! believe that they go first.
 //!
-//! Airplanes nearby can be seen, heard or not: their position, whether they are on an orbit, and the
+//! Airplanes nearby can be seen, heard or not: their position, whether they are on their fallback, and the
 //! side to which they then turn. Not visible are the candidates of an airplane, and the fallback of one
-//! that flies a profile. So the orbits that an unheard airplane may be on are: the one on which it is
-//! seen; or, if it flew a profile, that at the end of the plan that was heard of it in the exchange
-//! before; or else both from where it is seen.
+//! that flies a profile, unless that is its common plan. So what an unheard airplane may fly is: the fallback on which it is
+//! seen, or with which its common plan has ended; or, if it flew another plan, the orbit at the end of the one that was
+//! heard of it in the exchange before; or else both orbits from where it is seen. One whose fallback is not known to all
+//! has no common plan.
 //!
-//! **Invariant.** For any two airplanes, the orbits that the one may be on, as far as the other
-//! knows, include the one it is on; and the orbits that the two are on keep apart.
+//! **Invariant.** For any two airplanes, the fallbacks that the one may be on, as far as the other
+//! knows, include the one it is on; and the fallbacks that the two are on keep apart.
 //!
-//! *Why it is kept.* Take two airplanes, of which `i` goes first. Each flies its plan or its
-//! fallback. Whether `j` was heard or not, `i`'s plan keeps apart from `j`'s fallback: `j` has sent
-//! it, or it is among the orbits possible, from all of which `i`'s plan keeps apart. The fallbacks
+//! *Why it is kept.* Take two airplanes, of which `i` goes first. Each flies its plan, its common plan, or its
+//! fallback: the last also when its process has failed. Whether `j` was heard or not, `i`'s plan keeps apart from `j`'s
+//! fallback: `j` has sent it, all know it, or it is among the orbits possible, from all of which `i`'s plan keeps apart.
+//! It keeps apart from `j`'s common plan, which `i` has computed, too. The fallbacks and common plans
 //! keep apart from each other. So only `j`'s plan is left. `j` flies it only if it keeps apart from
-//! everything that `i` may do, or if it has heard that `i` accepts it; and `i` has compared it with
-//! both its own plan and its own fallback. So the two keep apart in every case, during `dt` and on
-//! the orbits after it. Each sees the orbit on which the other is after that, or has heard it as
-//! the end of the other's only plan; where it has not, both sides count as possible.
+//! everything that `i` may do (from its fallback and its common plan by the search, and from all else because it is out
+//! of `i`'s reach), or if it has heard that `i` accepts it; and `i` has compared it with
+//! all that it may fly itself. So the two keep apart in every case, during `dt` and on
+//! the fallbacks after it. Each knows the fallback on which the other is after that, or has heard it as
+//! the end of the other's only plan; where it has not, both orbits count as possible.
 //!
 //! Nothing in this depends on why an airplane is not heard, or for how long: a radio that is off, a
 //! partition, a unidirectional link, a burst of losses, or an airplane that has
@@ -54,8 +62,8 @@ use super::traffic_state::{
 };
 use crate::flight::{FlightLevelRange, Pose2};
 use crate::shield::{
-    ExemptIds, Fallback, OrbitSide, PlanCertainty, PlanRules, SafeManeuver, ShieldDecision,
-    ShieldedAircraft, TurnProfile, filter_maneuvers,
+    CommonPlan, ExemptIds, Fallback, OrbitSide, PlanCertainty, PlanEnding, PlanRules, SafeManeuver,
+    ShieldDecision, ShieldedAircraft, TurnProfile, filter_maneuvers_beside,
 };
 use serde::{Deserialize, Serialize};
 pub use setup::{ObservedAircraft, ShieldExchangeSetup};
@@ -67,7 +75,7 @@ use std::sync::Arc;
 pub enum ShieldExchangeMessage {
     /// Position of the sender, and the profiles it would fly.
     Proposal(Proposal),
-    /// The plan that it will fly if all agree; `None` for its fallback.
+    /// The plan that it will fly if all agree; `None` for what it flies without their consent.
     Plan(Option<Plan>),
     /// Ids of the airplanes whose plans it accepts, rising.
     Accepts(Vec<EntityId>),
@@ -138,7 +146,7 @@ fn unless_known<T: PartialEq>(value: T, known: T) -> Option<T> {
 #[derive(Debug, Default)]
 struct ShieldExchangeMember {
     proposal: Option<Proposal>,
-    /// Its plan, when it is known; `Some(None)` stands for its fallback.
+    /// Its plan, when it is known; `Some(None)` stands for what it flies without anybody's consent.
     plan: Option<Option<Plan>>,
     accepts: Option<Vec<EntityId>>,
     gone: bool,
@@ -155,6 +163,8 @@ impl ShieldExchangeMember {
 pub struct ShieldExchangeResult {
     /// What it flies: its plan if all that were asked have agreed, or else its fallback.
     pub decision: ShieldDecision,
+    /// The plan that all compute for it, if it flies that one instead.
+    pub common: Option<CommonPlan>,
     /// Whether it would have flown another plan if all had agreed.
     pub held_back: bool,
     /// Its knowledge of others after the exchange.
@@ -257,8 +267,8 @@ impl ShieldExchangeAgent {
 
     /// Returns all orbits that an unheard airplane may be on.
     fn possible_orbits(&self, place: usize) -> Vec<ShieldedAircraft> {
-        let ObservedAircraft { aircraft, is_on_orbit, .. } = &self.setup.aircraft[place];
-        if *is_on_orbit {
+        let ObservedAircraft { aircraft, is_fallback_known, .. } = &self.setup.aircraft[place];
+        if *is_fallback_known {
             return vec![aircraft.clone()];
         }
         let heard_plan = self.contacts.get(&aircraft.id).and_then(|contact| contact.planned);
@@ -304,22 +314,26 @@ impl ShieldExchangeAgent {
         let decision = self.compute_own_decision();
         self.decision = Some(decision);
         let contacts = self.contacts.clone();
-        self.result = Some(ShieldExchangeResult { decision, held_back: false, contacts });
+        self.result =
+            Some(ShieldExchangeResult { decision, common: None, held_back: false, contacts });
     }
 
     /// Computes plans for all, and returns its own.
     fn compute_own_decision(&self) -> ShieldDecision {
         let mut group = Vec::new();
         let mut candidates = Vec::new();
+        let mut common = Vec::new();
         let mut mine = 0;
         for place in 0..self.group_size() {
             if place == self.me {
                 mine = group.len();
                 group.push(self.aircraft.clone());
                 candidates.push(self.own.profiles.clone());
+                common.push(self.common_plan(place).cloned());
             } else if let Some(proposal) = &self.members[place].proposal {
                 group.push(self.aircraft_from_proposal(place, proposal));
                 candidates.push(proposal.profiles.clone());
+                common.push(self.common_plan(place).cloned());
             } else {
                 // An unheard airplane takes part on every orbit it may be on, without a choice.
                 let mut possible = self.possible_orbits(place);
@@ -328,18 +342,21 @@ impl ShieldExchangeAgent {
                     aircraft.exempt = exempt.clone();
                 }
                 candidates.extend(possible.iter().map(|_| Vec::new()));
+                common.extend(possible.iter().map(|_| self.common_plan(place).cloned()));
                 group.extend(possible);
             }
         }
-        filter_maneuvers(
-            &group,
-            &candidates,
-            PlanRules {
-                steps: self.steps_per_dt(),
-                dtau_s: self.dtau_s(),
-                certainty: self.setup.certainty,
+        let rules = PlanRules {
+            steps: self.steps_per_dt(),
+            dtau_s: self.dtau_s(),
+            certainty: self.setup.certainty,
+            ending: match self.setup.certainty {
+                PlanCertainty::Sure => PlanEnding::AnyFallback,
+                // Those who do not hear of the plan have to guess its end.
+                PlanCertainty::Mixable => PlanEnding::Orbit,
             },
-        )[mine]
+        };
+        filter_maneuvers_beside(&group, &candidates, &common, rules)[mine]
     }
 
     /// Returns the members with which an unheard airplane is an exempt pair, as far as they say so themselves.
@@ -359,37 +376,58 @@ impl ShieldExchangeAgent {
 
     /// Computes its plan, finds the members whose consent that needs, and returns it as a message.
     fn send_plan(&mut self) -> ShieldExchangeMessage {
-        let decision = self.compute_own_decision();
+        let decision = match self.common_plan(self.me) {
+            // A common plan leaves it predictable for all that do not hear it, in the cycles to come, too. That is worth
+            // more than a better path now.
+            Some(common) => ShieldDecision { candidate: None, fallback: common.fallback },
+            None => self.compute_own_decision(),
+        };
         self.decision = Some(decision);
         let fallback = decision.fallback;
         let plan = decision.candidate.map(|k| Plan { profile: k as u32, fallback });
-        // Its fallback needs no consent, because all others keep apart from it anyway.
+        // Its fallback and its common plan need no consent, because all others keep apart from them anyway.
         self.asked =
             if plan.is_some() { self.consent_members(&self.own_plan(plan)) } else { Vec::new() };
         self.members[self.me].plan = Some(plan);
         ShieldExchangeMessage::Plan(plan)
     }
 
+    /// Returns the plan that all compute for the airplane at a place, if it has one.
+    fn common_plan(&self, place: usize) -> Option<&CommonPlan> {
+        self.setup.aircraft[place].common.as_ref()
+    }
+
+    /// Returns what an airplane may fly without anybody's consent.
+    fn settled_plans(&self, place: usize, aircraft: &ShieldedAircraft) -> Vec<SafeManeuver> {
+        let common = self.common_plan(place);
+        let common = common.map(|plan| plan.to_maneuver(aircraft.clone(), self.dtau_s()));
+        common.into_iter().chain([self.fallback(aircraft.clone())]).collect()
+    }
+
     fn own_plan(&self, plan: Option<Plan>) -> SafeManeuver {
-        self.plan_of(self.aircraft.clone(), &self.own, plan).expect("it has proposed it")
+        self.plan_of(self.me, self.aircraft.clone(), &self.own, plan).expect("it has proposed it")
     }
 
     /// Returns the plan of a member, from its messages; `None` if it has not proposed that.
     fn plan_of(
         &self,
+        place: usize,
         aircraft: ShieldedAircraft,
         proposal: &Proposal,
         plan: Option<Plan>,
     ) -> Option<SafeManeuver> {
-        let Some(Plan { profile, fallback }) = plan else { return Some(self.fallback(aircraft)) };
+        let Some(Plan { profile, fallback }) = plan else {
+            return Some(self.settled_plans(place, &aircraft).swap_remove(0));
+        };
         let profile = proposal.profiles.get(profile as usize)?;
         Some(SafeManeuver::new(aircraft, profile, self.dtau_s(), fallback))
     }
 
-    /// Accepts the plans that keep apart from both its own plan and its own fallback.
+    /// Accepts the plans that keep apart from everything that it may fly itself.
     fn accept_plans(&mut self) -> ShieldExchangeMessage {
         let own = self.members[self.me].plan.flatten();
-        let mine = [self.own_plan(own), self.fallback(self.aircraft.clone())];
+        let mut mine = self.settled_plans(self.me, &self.aircraft);
+        mine.push(self.own_plan(own));
         let mut accepts = Vec::new();
         for place in (0..self.group_size()).filter(|&place| place != self.me) {
             let ShieldExchangeMember { proposal: Some(proposal), plan: Some(plan), .. } =
@@ -399,7 +437,7 @@ impl ShieldExchangeAgent {
             };
             let aircraft = self.aircraft_from_proposal(place, proposal);
             // A plan that was not proposed is nothing that could be flown.
-            let Some(theirs) = self.plan_of(aircraft, proposal, *plan) else { continue };
+            let Some(theirs) = self.plan_of(place, aircraft, proposal, *plan) else { continue };
             if mine.iter().all(|plan| plan.is_compatible(&theirs)) {
                 accepts.push(self.id(place));
             }
@@ -439,8 +477,11 @@ impl ShieldExchangeAgent {
         let fallback = ShieldDecision { candidate: None, fallback: self.aircraft.fallback };
         let preferred = self.decision.unwrap_or(fallback);
         let all_agree = self.asked.iter().all(|&place| self.has_accepted_own_plan(place));
+        let has_plan = matches!(self.members[self.me].plan, Some(Some(_)));
+        let is_settled = !(has_plan && all_agree);
         self.result = Some(ShieldExchangeResult {
-            decision: if all_agree { preferred } else { fallback },
+            decision: if is_settled { fallback } else { preferred },
+            common: self.common_plan(self.me).filter(|_| is_settled).cloned(),
             held_back: !all_agree,
             contacts: self.traffic_picture(),
         });
@@ -470,7 +511,8 @@ impl ShieldExchangeAgent {
             let planned = member.plan.as_ref().and_then(Option::as_ref);
             contact.planned =
                 planned.map(|plan| PlanEnd { as_of: now + 1, side: plan.fallback.orbit_side });
-            contact.presumed = Some(self.orbit_after_plan(&self.fallback(aircraft)));
+            let settled = self.settled_plans(place, &aircraft).swap_remove(0);
+            contact.presumed = Some(self.orbit_after_plan(&settled));
             contact.unheard_in = (!is_heard).then_some(now);
         }
         contacts
@@ -506,7 +548,7 @@ impl link::ProtocolAgent for ShieldExchangeAgent {
             ShieldExchangeMessage::Plan(plan) => {
                 let Some(Plan { profile, fallback }) = plan else { return Ok(()) };
                 let observed = &self.setup.aircraft[from];
-                InvalidMessage::Plan.ensure(observed.aircraft.may_store(*fallback))?;
+                InvalidMessage::Plan.ensure(fallback.is_orbiting())?;
                 InvalidMessage::Length.ensure((*profile as usize) < observed.max_profiles)
             }
             ShieldExchangeMessage::Accepts(accepted) => self.setup.check_members(accepted),

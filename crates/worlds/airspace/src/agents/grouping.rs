@@ -50,7 +50,7 @@ use super::participant::InvalidMessage;
 use crate::flight::Surface;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::PlanCertainty;
-pub use beacon::{Beacon, GroupingMessageItem, SurveillanceReport};
+pub use beacon::{Beacon, GroupingMessageItem, SurveillanceReport, TrackedState};
 use beacon_store::BeaconStore;
 use sidestep_kernel::EntityId;
 use std::collections::BTreeSet;

@@ -38,6 +38,8 @@ pub struct CommonKnowledge {
     pub non_cooperative: Vec<NonCooperativeAircraft>,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
+    /// Factor on the cost of deviations of each of the group, in the order of the ids.
+    pub deviation_weights: Vec<f64>,
 }
 
 /// A flight as it was filed: what all others know of it without a message.
@@ -78,6 +80,7 @@ impl CommonKnowledge {
         let frame = self.air.surface.frame_at(beacon.pose.at);
         ActionPredictions::new(predictions, frame, beacon.separation_m, beacon.levels)
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
+            .with_deviation_weight(self.deviation_weights[place])
     }
 
     /// Returns the frame in which the predictions of the airplane at a place lie: where all see it.

@@ -427,7 +427,8 @@ impl Optimizer for PredictionSharingAgent {
                         &common.non_cooperative,
                         &common.objective,
                         common.air.timing.dtau_s,
-                    );
+                    )
+                    .with_deviation_weight(common.deviation_weights[from]);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }

@@ -43,7 +43,7 @@ fn vector_length(a: Point) -> f64 {
 
 /// Returns an airplane at 35 m/s that wants to keep its heading, as tests of all methods have it.
 #[cfg(test)]
-fn test_aircraft(slot: EntitySlot, at: Point, heading_rad: f64) -> AircraftState {
+pub(crate) fn test_aircraft(slot: EntitySlot, at: Point, heading_rad: f64) -> AircraftState {
     AircraftState {
         slot,
         at,

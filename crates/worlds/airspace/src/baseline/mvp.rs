@@ -136,6 +136,16 @@ fn find_aircraft_by_slot(
     by_slot.get(first).copied().filter(|&k| all[k].slot == slot)
 }
 
+/// Returns whether one of two airplanes enters the other's zone within the look-ahead time, or has entered it, if both
+/// fly straight on.
+pub(crate) fn is_in_conflict(
+    own: &AircraftState,
+    other: &AircraftState,
+    settings: ReactiveSettings,
+) -> bool {
+    find_conflict(own, other, settings).is_some()
+}
+
 /// Returns the closest approach of two airplanes if one enters the other's zone within the look-ahead time, or has
 /// entered it.
 fn find_conflict(

@@ -11,6 +11,7 @@ use crate::flight::{Frame, InterOrderSegment, KnownAircraft, Point, Pose2, Surfa
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::purpose;
+use crate::right_of_way::Yielding;
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::stream::Draws;
@@ -107,13 +108,13 @@ fn decide_steering(
         }
     }
     let own = flying.iter().map(|&k| aircraft_state(world, group[k]));
-    let considered = ConsideredTraffic::new(world, own.chain(others.iter().copied()).collect());
+    let view = TrafficView::new(world, own.chain(others.iter().copied()).collect());
     let mut steering = vec![Steering::Proceed; group.len()];
     match &world.method {
         MethodKind::Orca => {
             for (place, &k) in flying.iter().enumerate() {
-                let own = &considered.all[place];
-                let others = considered.others_seen_from(place);
+                let own = &view.all[place];
+                let others = view.others_seen_from(place);
                 let heading_rad =
                     orca::heading_rad(own, others.iter(), world.orca, world.timing.dtau_s);
                 steering[k] = heading_rad.into();
@@ -121,8 +122,8 @@ fn decide_steering(
         }
         MethodKind::Own(method) => {
             for (place, &k) in flying.iter().enumerate() {
-                let others = considered.others_seen_from(place);
-                let own = &considered.all[place];
+                let others = view.others_seen_from(place);
+                let own = &view.all[place];
                 let one = CustomMethodContext { traffic, k, own, others: &others };
                 steering[k] = one.decide(world, method, &mut memory.draws[k]);
             }
@@ -130,9 +131,8 @@ fn decide_steering(
         MethodKind::Mvp => {
             let mut resolutions: Vec<mvp::ActiveResolutions> =
                 flying.iter().map(|&k| std::mem::take(&mut memory.resolving[k])).collect();
-            let meets = |own: usize, other: usize| considered.seen_from(own, other);
-            let found =
-                mvp::resolution_headings(&considered.all, &mut resolutions, world.mvp, meets);
+            let meets = |own: usize, other: usize| view.seen_from(own, other);
+            let found = mvp::resolution_headings(&view.all, &mut resolutions, world.mvp, meets);
             for ((&k, heading_rad), resolution) in flying.iter().zip(found).zip(resolutions) {
                 steering[k] = heading_rad.into();
                 memory.resolving[k] = resolution;
@@ -144,14 +144,14 @@ fn decide_steering(
     steering
 }
 
-/// The airplanes of a step that a method considers, and the frame of each.
-struct ConsideredTraffic<'a> {
+/// The airplanes that a method considers at one time, and the frame of each.
+pub(crate) struct TrafficView<'a> {
     world: &'a AirspaceWorld,
     all: Vec<AircraftState>,
     frames: Vec<Frame>,
 }
 
-impl<'a> ConsideredTraffic<'a> {
+impl<'a> TrafficView<'a> {
     fn new(world: &'a AirspaceWorld, all: Vec<AircraftState>) -> Self {
         let frames = all.iter().map(|one| world.surface.frame_at(one.at)).collect();
         Self { world, all, frames }
@@ -161,10 +161,49 @@ impl<'a> ConsideredTraffic<'a> {
         self.all[a].levels.overlaps(&self.all[b].levels, self.world.vertical_m)
     }
 
+    /// Returns the view of a group.
+    pub(crate) fn from_group(world: &'a AirspaceWorld, group: &[KnownAircraft]) -> Self {
+        Self::new(world, group.iter().map(|known| aircraft_state(world, *known)).collect())
+    }
+
+    /// Returns which of two gives way, by their places.
+    fn yielding(&self, a: usize, b: usize) -> Yielding {
+        let [one, other] = [&self.all[a], &self.all[b]];
+        // Nobody has right of way over one that avoids nobody.
+        if !self.world.uses_right_of_way || !(one.yields && other.yields) {
+            return Yielding::Both;
+        }
+        // Always as the one with the smaller slot sees it, so that both come to the same.
+        if one.slot < other.slot {
+            self.sight(a, b).map_or(Yielding::Both, |seen| self.world.yielding(one, &seen))
+        } else {
+            let yielding = |seen| self.world.yielding(other, &seen).swapped();
+            self.sight(b, a).map_or(Yielding::Both, yielding)
+        }
+    }
+
+    /// Returns which of two gives way if they are in conflict within the horizon; `None` if they are not.
+    pub(crate) fn yielding_in_conflict(&self, a: usize, b: usize) -> Option<Yielding> {
+        let settings = self.world.reactive_settings();
+        let seen = self.sight(a, b)?;
+        mvp::is_in_conflict(&self.all[a], &seen, settings).then(|| self.yielding(a, b))
+    }
+
+    /// Returns another airplane as one has to mind it: as it sees it; one that gives way not at all, unless the method is
+    /// of the program's own; and one that need not give way as one that does not.
+    fn seen_from(&self, own: usize, other: usize) -> Option<AircraftState> {
+        let seen = self.sight(own, other)?;
+        match self.yielding(own, other) {
+            Yielding::First => Some(AircraftState { yields: false, ..seen }),
+            Yielding::Second if !matches!(self.world.method, MethodKind::Own(_)) => None,
+            Yielding::Second | Yielding::Both => Some(seen),
+        }
+    }
+
     /// Returns another airplane as one sees it: in the plane of the scenario as it is, on the earth in the frame where the
     /// one is, so that positions and velocities of the two can be subtracted. `None` for one on another level, or on
     /// the earth so far away that the two cannot come too near within the look-ahead time.
-    fn seen_from(&self, own: usize, other: usize) -> Option<AircraftState> {
+    fn sight(&self, own: usize, other: usize) -> Option<AircraftState> {
         let Self { world, all, frames } = self;
         if !self.is_on_level(own, other) {
             return None;

@@ -3,7 +3,7 @@
 use crate::decide::ManeuverCandidates;
 use crate::join::CooperativeGroup;
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::pilot::{AirplaneControl, ConversationSchedule, Pilot, PilotMemory};
+use crate::pilot::{AirplaneControl, CommonPlans, ConversationSchedule, Pilot, PilotMemory};
 use crate::purpose;
 use crate::scratch::PhaseContext;
 use crate::state::AirspaceState;
@@ -28,7 +28,9 @@ pub(crate) fn decide_group(
     let conversations = world.scheduled_conversation_times(now, schedule);
     let mut network = conversation_network(world, state, &conversations);
     let mut pilots = pilots(world, &flown.ids, state.take_memories(&flown.ids));
+    let plans = CommonPlans::default();
     for (pilot, percept) in pilots.iter_mut().zip(percepts) {
+        pilot.share_common_plans(&plans);
         pilot.start_with_schedule(percept, schedule);
     }
     network.run(&mut pilots, schedule.begins, Pilot::has_decided);

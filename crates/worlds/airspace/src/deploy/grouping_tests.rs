@@ -161,18 +161,19 @@ proptest! {
 /// Airplane 0 and airplane 1 do not hear each other, and both hear airplane 2.
 #[test]
 fn two_that_do_not_hear_each_other_are_in_one_group_by_way_of_one_that_hears_both() {
-    let cut = "network = { partitions = [{ sides = [[0], [1]] }] }";
     let three = "[airspace.generator]\nkind = \"superconflict\"\nn = 3\nradius_m = 4000.0\n";
-    let text = scenario(&format!("deployment = \"compact-team\"\n{cut}"), three);
-    let flown = |groups: &str| {
-        let mut run = run(&text, &format!("groups = \"{groups}\""));
+    let flown = |sides: &str| {
+        let cut = format!("network = {{ partitions = [{{ sides = {sides} }}] }}");
+        let text = scenario(&format!("deployment = \"compact-team\"\n{cut}"), three);
+        let mut run = run(&text, "groups = \"heard\"");
         run.advance(250);
-        run.metrics()
+        let metrics = run.metrics();
+        assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 3), "{sides}: {metrics:?}");
+        metrics.mean_delay_percent.expect("all arrive")
     };
-    let [heard, announced] = ["heard", "announced"].map(flown);
-    assert_eq!((heard.losses_of_separation, heard.arrived), (0, 3), "{heard:?}");
-    let [heard, announced] = [&heard, &announced].map(|m| m.mean_delay_percent.expect("arrived"));
-    assert!(heard < announced + 5.0, "{heard} %, {announced} % where groups are announced");
+    let joined = flown("[[0], [1]]");
+    let alone = flown("[[0], [1], [2]]");
+    assert!(joined < 0.6 * alone, "{joined} %, {alone} % where no two hear each other");
 }
 
 /// Flies a scenario of faults of [`RandomScenario`] by groups that are heard. Returns the pairs that lose separation

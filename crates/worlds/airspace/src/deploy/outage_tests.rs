@@ -107,7 +107,7 @@ impl RandomScenario {
     pub(super) fn text(&mut self) -> String {
         let late = if self.happens(0.5) { self.late() } else { String::new() };
         let deployment = ["team", "compact-team", "pim"][self.draws.uniform_below(3) as usize];
-        let method = if self.happens(0.1) { "pc" } else { "none" };
+        let method = ["none", "none", "mvp", "orca", "pc"][self.draws.uniform_below(5) as usize];
         let (kind, least_m) = match self.happens(0.7) {
             true => ("superconflict", 350.0 * f64::from(self.n)),
             false => ("random", 1300.0 * f64::from(self.n).sqrt()),

@@ -28,6 +28,8 @@ pub struct AirplaneStart {
     pub track: Option<Track>,
     /// Whether it avoids nobody: it flies its recorded track to the end, or straight from way-point to way-point.
     pub is_non_cooperative: bool,
+    /// Its priority: it has right of way over airplanes with a smaller one.
+    pub priority: u8,
 }
 
 impl AirplaneStart {

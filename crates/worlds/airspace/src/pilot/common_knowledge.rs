@@ -1,6 +1,7 @@
 //! The knowledge with which an airplane goes into a conversation: its perceptions, and the filed flights.
 
-use super::percept::{OwnshipState, Percept, SurveillanceReport};
+use super::common_plans::CommonPlans;
+use super::percept::{Percept, SurveillanceReport, TrackedState, priority_rank};
 use crate::agents::exchange::{ObservedAircraft, ShieldExchangeSetup};
 use crate::agents::traffic_state::{LastKnownState, OrbitState, StateBeacon, TrafficPicture};
 use crate::agents::{CommonKnowledge, FiledFlight, Ownship};
@@ -19,6 +20,8 @@ pub(super) fn common_knowledge(
     not_heard: &[SurveillanceReport],
 ) -> Arc<CommonKnowledge> {
     let straight = not_heard.iter().map(|one| unheard_as_non_cooperative(world, one));
+    let group: Vec<KnownAircraft> =
+        percept.group.iter().map(|one| one.as_known_aircraft()).collect();
     Arc::new(CommonKnowledge {
         now: percept.cycle,
         ids: percept.members().into(),
@@ -30,6 +33,7 @@ pub(super) fn common_knowledge(
         streams: world.streams,
         non_cooperative: percept.non_cooperative.iter().cloned().chain(straight).collect(),
         is_shielded: world.shield,
+        deviation_weights: world.deviation_weights(&group),
     })
 }
 
@@ -118,13 +122,16 @@ pub(super) fn shield_exchange_setup(
     world: &AirspaceWorld,
     percept: &Percept,
     unheard: &[SurveillanceReport],
+    plans: &CommonPlans,
 ) -> ShieldExchangeSetup {
-    let present = percept.group.iter().map(|one| (one, true));
-    let mut all: Vec<_> = present.chain(unheard.iter().map(|one| (one, false))).collect();
-    all.sort_unstable_by_key(|(one, _)| one.id);
+    let plans = plans.of_group(world, percept);
+    let present = percept.group.iter().zip(plans).map(|(one, common)| (one, true, common));
+    let others = unheard.iter().map(|one| (one, false, None));
+    let mut all: Vec<_> = present.chain(others).collect();
+    all.sort_unstable_by_key(|(one, ..)| one.id);
     let mut aircraft = Vec::with_capacity(all.len());
-    for (one, takes_part) in all {
-        let seen = shielded_aircraft_from_report(world, &percept.own, one);
+    for (one, takes_part, common) in all {
+        let seen = shielded_aircraft_from_report(world, &percept.own.exempt, percept.own.id, one);
         let filed_v_m_s = seen.v_m_s;
         let filed_levels = seen.levels;
         aircraft.push(ObservedAircraft {
@@ -136,6 +143,8 @@ pub(super) fn shield_exchange_setup(
             filed_v_m_s,
             filed_levels,
             is_on_orbit: one.orbit.is_some(),
+            is_fallback_known: one.orbit.is_some() || one.tracked.is_some(),
+            common,
             takes_part,
             max_speed_m_s: world.top_m_s[one.id as usize],
             // A profile that was found by other means comes before those of its actions.
@@ -153,16 +162,49 @@ pub(super) fn shield_exchange_setup(
     }
 }
 
-/// Returns another airplane as the shield knows it from its visible state and its filed flight: where messages get
-/// lost, no order changes its speed or its level.
+/// Returns another airplane as the shield of airplane `own` knows it from its visible state and its filed flight: where
+/// messages get lost, no order changes its speed or its level. `exempt` are those with which `own` is an exempt pair.
 fn shielded_aircraft_from_report(
     world: &AirspaceWorld,
-    own: &OwnshipState,
+    exempt: &[EntityId],
+    own: EntityId,
     one: &SurveillanceReport,
 ) -> ShieldedAircraft {
+    let exempt = exempt.binary_search(&one.id).map_or(Vec::new(), |_| vec![own]);
+    shielded_aircraft_seen(world, one, exempt)
+}
+
+/// Returns an airplane as all know it who have watched its flight.
+pub(super) fn watched_aircraft(
+    world: &AirspaceWorld,
+    percept: &Percept,
+    one: &SurveillanceReport,
+) -> ShieldedAircraft {
+    let mut exempt = Vec::new();
+    for &[a, b] in &percept.exempt_pairs {
+        if a == one.id {
+            exempt.push(b);
+        } else if b == one.id {
+            exempt.push(a);
+        }
+    }
+    exempt.sort_unstable();
+    // Nobody sees how often the shield has refused its preferred maneuver.
+    let rank = priority_rank(world, &one.as_tracked_aircraft(), 0);
+    ShieldedAircraft { rank, ..shielded_aircraft_seen(world, one, exempt) }
+}
+
+fn shielded_aircraft_seen(
+    world: &AirspaceWorld,
+    one: &SurveillanceReport,
+    exempt: Vec<EntityId>,
+) -> ShieldedAircraft {
     let segment = world.segment(one.id, 0);
-    let exempt =
-        own.exempt.binary_search(&one.id).map_or(&[][..], |_| std::slice::from_ref(&own.id));
+    let fallback = match one.tracked {
+        Some(TrackedState { fallback, .. }) => fallback,
+        // The side of one that flies a profile is not visible; the exchange tries both.
+        None => Fallback::from_side(one.orbit.unwrap_or(OrbitSide::Left)),
+    };
     ShieldedAircraft {
         id: one.id,
         frame: world.surface.frame_at(one.pose.at),
@@ -175,8 +217,7 @@ fn shielded_aircraft_from_report(
         error_m: world.error_m(one.id as usize),
         levels: FlightLevelRange::between(one.altitude_m, segment.altitude_m),
         vertical_m: world.vertical_m,
-        // The side of one that flies a profile is not visible; the exchange tries both.
-        fallback: Fallback::from_side(one.orbit.unwrap_or(OrbitSide::Left)),
+        fallback,
         choices: Arc::clone(&world.fallbacks[one.id as usize]),
         dt_s: world.timing.dt_s,
         exempt: exempt.into(),

@@ -6,7 +6,7 @@ use crate::agents::{ActionChoice, ReachedCost};
 use crate::baseline::mvp::ActiveResolutions;
 use crate::decide::ManeuverCandidates;
 use crate::events::Event;
-use crate::shield::{Fallback, ShieldDecision, TurnProfile};
+use crate::shield::{CommonPlan, Fallback, ShieldDecision, TurnProfile};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -44,6 +44,8 @@ pub enum Maneuver {
         profile: TurnProfile,
         /// The fallback that it stores for the end of the profile.
         fallback: Fallback,
+        /// Whether this is the plan that all compute for it, so that all who see it know its fallback.
+        is_common: bool,
     },
     /// Its stored fallback.
     Orbit,
@@ -98,9 +100,16 @@ impl Maneuver {
                 candidate: candidate as u32,
                 profile: candidates.profiles[candidate].clone(),
                 fallback: decision.fallback,
+                is_common: false,
             },
             None => Self::Orbit,
         }
+    }
+
+    /// Returns the plan that all compute for an airplane as a maneuver.
+    pub(crate) fn from_common_plan(plan: CommonPlan) -> Self {
+        let CommonPlan { candidate, profile, fallback } = plan;
+        Self::Profile { candidate, profile, fallback, is_common: true }
     }
 
     /// Returns the maneuver as a decision of the shield; `stored` is the stored fallback.

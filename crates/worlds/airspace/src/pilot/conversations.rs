@@ -1,6 +1,7 @@
 //! The conversations of a cycle: the participants of them, by deployment and method, and their outcomes.
 
 use super::common_knowledge::{filed_flight, ownship, plan_certainty, shield_exchange_setup};
+use super::common_plans::CommonPlans;
 use super::percept::Percept;
 use crate::agents::coordinator::CoordinatorHostParticipant;
 use crate::agents::exchange::{self, ShieldExchangeResult};
@@ -121,6 +122,8 @@ pub(super) struct PilotKnowledge<'a> {
     pub(super) unheard: &'a [SurveillanceReport],
     /// Its knowledge of others from earlier cycles.
     pub(super) contacts: &'a TrafficPicture,
+    /// The plans that all compute.
+    pub(super) plans: &'a CommonPlans,
 }
 
 fn new_endpoint_participant<A>(agent: A, config: EndpointConfig) -> Box<DynParticipant>
@@ -167,7 +170,7 @@ pub(super) fn optimization_participant(
     knowledge: PilotKnowledge<'_>,
     config: EndpointConfig,
 ) -> Box<DynParticipant> {
-    let PilotKnowledge { world, percept, unheard, contacts } = knowledge;
+    let PilotKnowledge { world, percept, unheard, contacts, .. } = knowledge;
     let own = ownship(world, percept, unheard, contacts);
     match (world.deployment, world.settings.estimator) {
         (Deployment::Pim | Deployment::HierarchicalPim, _) => {
@@ -220,8 +223,8 @@ pub(super) fn shield_exchange_participant(
     profiles: &[TurnProfile],
     config: EndpointConfig,
 ) -> Box<DynParticipant> {
-    let PilotKnowledge { world, percept, unheard, contacts } = knowledge;
-    let scene = Arc::new(shield_exchange_setup(world, percept, unheard));
+    let PilotKnowledge { world, percept, unheard, contacts, plans } = knowledge;
+    let scene = Arc::new(shield_exchange_setup(world, percept, unheard, plans));
     new_endpoint_participant(
         exchange::ShieldExchangeAgent::new(scene, config.me, profiles, contacts.clone()),
         config,

@@ -20,10 +20,12 @@
 //! program.rs                       the state machine
 //! schedule.rs, early_packets.rs    when conversations start and end; packets of conversations to come
 //! common_knowledge.rs              the knowledge with which it goes into a conversation
+//! common_plans.rs                  what all compute for each from what all see, where nobody is heard
 //! conversations.rs                 the participants of the conversations
 //! ```
 
 mod common_knowledge;
+mod common_plans;
 mod control;
 mod conversations;
 mod early_packets;
@@ -34,8 +36,9 @@ mod schedule;
 mod tests;
 
 pub use crate::agents::packet::{ConversationId, Protocol};
+pub(crate) use common_plans::CommonPlans;
 pub use control::{AirplaneControl, Maneuver, OptimizationStatus, PilotMemory};
-pub use percept::{OwnshipState, Percept, SurveillanceReport};
+pub use percept::{OwnshipState, Percept, SurveillanceReport, TrackedState};
 pub use program::Pilot;
 pub(crate) use schedule::ConversationSchedule;
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Percepts: all that an airplane perceives at the start of a cycle.
 
 use crate::agents::InvalidMessage;
-pub use crate::agents::grouping::SurveillanceReport;
+pub use crate::agents::grouping::{SurveillanceReport, TrackedState};
 use crate::external_action::ExternalAction;
-use crate::flight::{FlightLevelRange, InterOrderSegment, KnownAircraft, Pose2, Surface};
+use crate::flight::{FlightLevelRange, KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{Fallback, OrbitTracker, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
@@ -11,9 +11,11 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 use std::sync::Arc;
 
-/// Distance in meters beyond which all goals rank alike: about half of the range of a rank's 32 bits, of which
+/// Distance in meters beyond which all goals rank alike: about half of the range of 30 bits of a rank, of which
 /// refusals have the other half.
-const MAX_RANKED_DISTANCE_M: f64 = 2e9;
+const MAX_RANKED_DISTANCE_M: f64 = 5e8;
+/// Largest number in those bits; the priority is above them.
+const MAX_RANK_M: f64 = ((1u32 << 30) - 1) as f64;
 /// Fraction of the distance flown in a `dt` by which a refusal brings an airplane forward in rank, so that it does
 /// not wait forever. It is small, so that an airplane near its goal still goes first and is soon gone: to overtake one
 /// that is a `dt` nearer takes eight refusals.
@@ -32,6 +34,8 @@ pub struct Percept {
     pub group: Vec<SurveillanceReport>,
     /// Non-cooperative airplanes near these, as all see them.
     pub non_cooperative: Vec<NonCooperativeAircraft>,
+    /// The exempt pairs of the group, by rising ids; none where airplanes have no common plans.
+    pub exempt_pairs: Vec<[EntityId; 2]>,
 }
 
 /// An airplane as those aboard know it.
@@ -91,26 +95,14 @@ impl OwnshipState {
             choices: Arc::clone(&world.fallbacks[self.id as usize]),
             dt_s: world.timing.dt_s,
             exempt: self.exempt.as_slice().into(),
-            rank: self.priority_rank(world.surface, world.timing.dt_s, &segment),
+            rank: priority_rank(
+                world,
+                // Along the whole route, from where its own instruments see it: others are sent its rank, and do not
+                // compute it.
+                &KnownAircraft { pose: self.pose, ..self.as_known_aircraft() },
+                self.refusals,
+            ),
         }
-    }
-
-    /// Returns its rank. It is higher the nearer its goal is, so that it is soon gone, and the more
-    /// often it was refused its preferred maneuver, so that no airplane waits forever. Whole meters in the upper half; the id in the
-    /// lower half makes it unique.
-    fn priority_rank(&self, surface: Surface, dt_s: f64, segment: &InterOrderSegment<'_>) -> u64 {
-        // A percept that came off a network may count more way-points than there are.
-        let ahead = &segment.mission[(self.next as usize).min(segment.mission.len())..];
-        // Along the whole route, from where its own instruments see it: others are sent its rank, and do not compute
-        // it.
-        let legs = ahead.iter().scan(self.pose.at, |from, &to| {
-            Some(surface.distance_m(std::mem::replace(from, to), to))
-        });
-        let refused_m = f64::from(self.refusals) * segment.model.v_m_s * dt_s;
-        // The conversion saturates at the ends of the range.
-        let first =
-            (MAX_RANKED_DISTANCE_M + REFUSAL_FRACTION * refused_m - legs.sum::<f64>()) as u32;
-        u64::from(first) << 32 | u64::from(!self.id)
     }
 
     /// Returns the turn profile by which it keeps to its stored fallback for one `dt`.
@@ -127,6 +119,23 @@ impl OwnshipState {
         let tracker = OrbitTracker::new(pose, orbit_pose, model, omega_rad_s);
         TurnProfile { omegas_rad_s: tracker.turn_rates_rad_s(steps, world.timing.dtau_s, gust_rad) }
     }
+}
+
+/// Returns the rank of an airplane. That of a higher priority is higher; else it is higher the nearer its goal is, so that it is soon gone, and the more often it
+/// was refused its preferred maneuver, so that no airplane waits forever. Whole meters in the upper half; the id in the
+/// lower half makes it unique.
+pub(super) fn priority_rank(world: &AirspaceWorld, known: &KnownAircraft, refusals: u32) -> u64 {
+    let segment = world.segment(known.slot, known.orders);
+    // A percept that came off a network may count more way-points than there are.
+    let ahead = &segment.mission[known.next.min(segment.mission.len())..];
+    let legs = ahead.iter().scan(known.pose.at, |from, &to| {
+        Some(world.surface.distance_m(std::mem::replace(from, to), to))
+    });
+    let refused_m = f64::from(refusals) * segment.model.v_m_s * world.timing.dt_s;
+    let nearness_m = MAX_RANKED_DISTANCE_M + REFUSAL_FRACTION * refused_m - legs.sum::<f64>();
+    // The conversion saturates at 0.
+    let first = u32::from(world.priority(known.slot)) << 30 | nearness_m.min(MAX_RANK_M) as u32;
+    u64::from(first) << 32 | u64::from(!known.slot)
 }
 
 impl Percept {

@@ -3,6 +3,7 @@
 mod conclude;
 mod cycle_state;
 
+use super::common_plans::CommonPlans;
 use super::control::{AirplaneControl, Maneuver, PilotMemory};
 use super::conversations::{
     DynParticipant, PilotKnowledge, grouping_participant, intent_participant,
@@ -42,6 +43,8 @@ pub struct Pilot {
     memory: PilotMemory,
     /// The cycle that it is in, or was in last.
     state: Option<PilotCycleState>,
+    /// The common plans of the cycle that it starts next.
+    plans: CommonPlans,
     /// Talks that have ended for it.
     past: VecDeque<Conversation<dyn Participant>>,
     early: EarlyPackets,
@@ -71,6 +74,7 @@ impl Pilot {
             id,
             memory,
             state: None,
+            plans: CommonPlans::default(),
             past: VecDeque::new(),
             early: EarlyPackets::default(),
             dropped: DropCounts::default(),
@@ -82,6 +86,11 @@ impl Pilot {
     pub fn with_build_id(self, build: &str) -> Self {
         let fingerprint = digest_pieces([build.as_bytes(), &self.world.fingerprint.to_le_bytes()]);
         Self { fingerprint, ..self }
+    }
+
+    /// Shares the plans that all compute in the next cycle with other pilots of the process.
+    pub(crate) fn share_common_plans(&mut self, plans: &CommonPlans) {
+        self.plans = plans.clone();
     }
 
     /// Starts the conversations of a cycle. Unfinished conversations of an earlier one are given up.
@@ -124,6 +133,7 @@ impl Pilot {
             candidates: ManeuverCandidates::default(),
             control,
             percept,
+            plans: std::mem::take(&mut self.plans),
         });
     }
 
@@ -287,7 +297,7 @@ impl Pilot {
         let Some(state) = &mut self.state else { return };
         let world = &*self.world;
         let known = state.topic_members(topic);
-        let PilotCycleState { percept, schedule, members, unheard, candidates, .. } = state;
+        let PilotCycleState { percept, schedule, members, unheard, candidates, plans, .. } = state;
         let (start_tick, end_tick) = schedule.conversation_tick_range(topic, tick);
         let id = match topic {
             // Its members are not known yet.
@@ -320,7 +330,7 @@ impl Pilot {
                 let allowed = allowed_profiles(world, percept, candidates);
                 let profiles: Vec<_> =
                     allowed.iter().map(|&k| candidates.profiles[k].clone()).collect();
-                let knowledge = PilotKnowledge { world, percept, unheard, contacts };
+                let knowledge = PilotKnowledge { world, percept, unheard, contacts, plans };
                 let participant = shield_exchange_participant(knowledge, &profiles, config);
                 PilotCyclePhase::Shielding(Conversation::new(info, participant), allowed)
             }
@@ -333,7 +343,7 @@ impl Pilot {
                 PilotCyclePhase::Deciding(Conversation::new(info, participant))
             }
             Protocol::Decision => {
-                let knowledge = PilotKnowledge { world, percept, unheard, contacts };
+                let knowledge = PilotKnowledge { world, percept, unheard, contacts, plans };
                 let participant = optimization_participant(knowledge, config);
                 PilotCyclePhase::Deciding(Conversation::new(info, participant))
             }

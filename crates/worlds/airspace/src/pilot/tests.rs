@@ -3,6 +3,7 @@
 mod fleet;
 mod hostile;
 mod order;
+mod silence;
 
 use super::*;
 use crate::deploy::run_pilot_conversations;

@@ -222,6 +222,7 @@ impl Compiler<'_> {
             orders,
             track: None,
             is_non_cooperative: s.is_non_cooperative(self.source)?,
+            priority: s.priority.map_or(0, |priority| priority.get() as u8),
         })
     }
 
@@ -249,7 +250,8 @@ impl Compiler<'_> {
         let callsign = section.get_ref().callsign(self.source)?;
         let is_non_cooperative = section.get_ref().is_non_cooperative(self.source)?;
         let airplane = replayed_airplane(track, model, replay, is_non_cooperative);
-        Ok(AirplaneStart { callsign, ..airplane })
+        let priority = section.get_ref().priority.map_or(0, |priority| priority.get() as u8);
+        Ok(AirplaneStart { callsign, priority, ..airplane })
     }
 
     /// Returns the time for which recorded airplanes follow their tracks.
@@ -295,5 +297,6 @@ fn replayed_airplane(
         orders: Vec::new(),
         track: Some(track),
         is_non_cooperative,
+        priority: 0,
     }
 }

@@ -145,6 +145,8 @@ impl<'a> Compiler<'a> {
             minimum_up_to: section.minimum_up_to.map_or(0, |airplanes| airplanes.get() as usize),
             group_bytes: (section.group_memory_gib.map_or(2.0, f64::from) * GIB) as u64,
             shield: section.shield.0,
+            right_of_way: section.right_of_way,
+            uses_right_of_way: false,
             vertical_m,
             origin_deg,
             surface,

@@ -46,8 +46,9 @@
 //!
 //! Airplanes that turn at different rates orbit at one rate, which all can fly (`common_orbit_rates`).
 //! Then plans of airplanes that pass each other are nearly always compatible, and the shield costs
-//! little (`delay_tests.rs`). Where messages get lost, fallbacks are orbits alone: an airplane is seen to orbit, and to
-//! which side, and so others know its fallback without hearing of it.
+//! little (`delay_tests.rs`). Where messages get lost, plans of which others
+//! have to hear end with orbits alone: an airplane is seen to orbit, and to which side, and so others know its fallback
+//! without hearing of it. Plans that all compute from what all see may end with any (`pilot/common_plans.rs`).
 //!
 //! Numbers: `orbit.rs` and `fallback.rs` never wrongly find that motions stay apart. New plans must keep slightly
 //! more than `R` (by `MARGIN_M`), so that rounding never adds up to a loss.
@@ -78,7 +79,8 @@ pub use fallback::Fallback;
 pub use orbit::OrbitSide;
 pub(crate) use orbit::stays_apart_for;
 pub(crate) use safe_maneuver::SafeManeuver;
-pub use safe_maneuver::TurnProfile;
-pub use search::{PlanCertainty, PlanRules, ShieldDecision, filter_maneuvers};
+pub use safe_maneuver::{CommonPlan, TurnProfile};
+pub(crate) use search::filter_maneuvers_beside;
+pub use search::{PlanCertainty, PlanEnding, PlanRules, ShieldDecision, filter_maneuvers};
 pub(crate) use shielded_aircraft::ExemptIds;
 pub use shielded_aircraft::ShieldedAircraft;

@@ -15,6 +15,35 @@ pub struct TurnProfile {
     pub omegas_rad_s: Vec<f64>,
 }
 
+/// A plan that all airplanes compute for one of them from what all see, so that none has to hear of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CommonPlan {
+    /// Number of its profile among those that the method would choose for the airplane: 0 for the preferred one.
+    pub candidate: u32,
+    /// The motion of one `dt`.
+    pub profile: TurnProfile,
+    /// The fallback after it.
+    pub fallback: Fallback,
+}
+
+impl CommonPlan {
+    pub(crate) fn to_maneuver(&self, aircraft: ShieldedAircraft, dtau_s: f64) -> SafeManeuver {
+        let Self { profile, fallback, .. } = self;
+        SafeManeuver::from_source(aircraft, profile, dtau_s, PlanSource::Common, *fallback)
+    }
+}
+
+/// Where a plan comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum PlanSource {
+    /// A candidate of the airplane, by its number.
+    Candidate(usize),
+    /// The plan that all compute for it from what all see.
+    Common,
+    /// Its stored fallback.
+    Fallback,
+}
+
 /// The motion of one `dt`, and a fallback on which the airplane waits after that.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SafeManeuver {
@@ -24,8 +53,7 @@ pub(crate) struct SafeManeuver {
     fallback: Fallback,
     /// The path after `dt`.
     path: FallbackPath,
-    /// Number of the candidate, `None` for the stored fallback.
-    pub(super) candidate: Option<usize>,
+    pub(super) source: PlanSource,
 }
 
 /// The motion of an airplane in one `dt`.
@@ -89,31 +117,31 @@ impl SafeManeuver {
         dtau_s: f64,
         fallback: Fallback,
     ) -> Self {
-        Self::from_candidate(aircraft, profile, dtau_s, None, fallback)
+        Self::from_source(aircraft, profile, dtau_s, PlanSource::Fallback, fallback)
     }
 
-    /// Returns the same for a candidate, by its number.
-    pub(super) fn from_candidate(
+    /// Returns the same with its source.
+    pub(super) fn from_source(
         aircraft: ShieldedAircraft,
         profile: &TurnProfile,
         dtau_s: f64,
-        candidate: Option<usize>,
+        source: PlanSource,
         fallback: Fallback,
     ) -> Self {
         let start = aircraft.local_pose();
         let motion = ProfileMotion::new(start, aircraft, profile.omegas_rad_s.clone(), dtau_s);
-        Self { candidate, ..Self::from_motion(Arc::new(motion), fallback) }
+        Self { source, ..Self::from_motion(Arc::new(motion), fallback) }
     }
 
     fn from_motion(motion: Arc<ProfileMotion>, fallback: Fallback) -> Self {
         let path = motion.aircraft.fallback_path_from(motion.end_pose(), fallback);
-        Self { motion, fallback, path, candidate: None }
+        Self { motion, fallback, path, source: PlanSource::Fallback }
     }
 
     /// Returns the same plan with another fallback.
     pub(super) fn with_fallback(&self, fallback: Fallback) -> Self {
         let changed = Self::from_motion(Arc::clone(&self.motion), fallback);
-        Self { candidate: self.candidate, ..changed }
+        Self { source: self.source, ..changed }
     }
 
     /// Returns the stored fallback as a plan, for some steps and forever after them.
@@ -181,8 +209,16 @@ impl SafeManeuver {
         })
     }
 
-    /// Returns whether this is the stored fallback.
-    pub(super) fn is_on_fallback(&self) -> bool {
-        self.candidate.is_none()
+    /// Returns the number of the candidate, if it is one.
+    pub(super) fn candidate(&self) -> Option<usize> {
+        match self.source {
+            PlanSource::Candidate(k) => Some(k),
+            PlanSource::Common | PlanSource::Fallback => None,
+        }
+    }
+
+    /// Returns whether this is none of the candidates: the search leaves it as it is.
+    pub(super) fn is_settled(&self) -> bool {
+        !matches!(self.source, PlanSource::Candidate(_))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::fallback::Fallback;
 use super::neighbors::neighbors;
-use super::safe_maneuver::{SafeManeuver, TurnProfile};
+use super::safe_maneuver::{CommonPlan, PlanSource, SafeManeuver, TurnProfile};
 use super::shielded_aircraft::ShieldedAircraft;
 use rustc_hash::FxHashMap;
 use std::cell::RefCell;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 /// The plan that the shield gives an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ShieldDecision {
-    /// Number of the candidate to fly, `None` for the stored fallback.
+    /// Number of the candidate to fly; `None` for the plan that all compute for it, or else for the stored fallback.
     pub candidate: Option<usize>,
     /// The fallback to store after that.
     pub fallback: Fallback,
@@ -27,6 +27,15 @@ pub enum PlanCertainty {
     Mixable,
 }
 
+/// The fallbacks that plans may end with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlanEnding {
+    /// All that the airplane may choose.
+    AnyFallback,
+    /// Orbits at once, because others may have to guess it.
+    Orbit,
+}
+
 /// What plans consist of, the same for all airplanes.
 #[derive(Debug, Clone, Copy)]
 pub struct PlanRules {
@@ -36,6 +45,18 @@ pub struct PlanRules {
     pub dtau_s: f64,
     /// Whether all are sure to be flown.
     pub certainty: PlanCertainty,
+    /// The fallbacks with which they may end.
+    pub ending: PlanEnding,
+}
+
+impl PlanRules {
+    /// Returns the fallback that a plan ends with before another one is tried: the stored one, as far as it may.
+    fn stored_fallback(&self, aircraft: &ShieldedAircraft) -> Fallback {
+        match self.ending {
+            PlanEnding::AnyFallback => aircraft.fallback,
+            PlanEnding::Orbit => Fallback::from_side(aircraft.fallback.orbit_side),
+        }
+    }
 }
 
 /// Decides for airplanes with stored fallbacks that are pairwise apart. `candidates[i]` are the
@@ -45,13 +66,24 @@ pub fn filter_maneuvers(
     candidates: &[Vec<TurnProfile>],
     rules: PlanRules,
 ) -> Vec<ShieldDecision> {
-    let mut search = ShieldSearch::new(group, candidates, rules);
+    filter_maneuvers_beside(group, candidates, &vec![None; group.len()], rules)
+}
+
+/// Decides likewise where all compute a plan in `common` for some airplanes, which these fly rather than their fallbacks.
+/// Those plans, and the fallbacks of all, are pairwise compatible in any mixture.
+pub(crate) fn filter_maneuvers_beside(
+    group: &[ShieldedAircraft],
+    candidates: &[Vec<TurnProfile>],
+    common: &[Option<CommonPlan>],
+    rules: PlanRules,
+) -> Vec<ShieldDecision> {
+    let mut search = ShieldSearch::new(group, candidates, common, rules);
     search.resolve_conflicts();
     search.improve_plans();
     search
         .plans
         .iter()
-        .map(|p| ShieldDecision { candidate: p.candidate, fallback: p.fallback() })
+        .map(|p| ShieldDecision { candidate: p.candidate(), fallback: p.fallback() })
         .collect()
 }
 
@@ -64,6 +96,8 @@ struct ShieldSearch<'a> {
     rules: PlanRules,
     plans: Vec<SafeManeuver>,
     fallbacks: Vec<SafeManeuver>,
+    /// The plans that all compute, of those that have one.
+    common: Vec<Option<SafeManeuver>>,
     /// Airplanes by rising rank.
     by_rank: Vec<usize>,
     /// Those with which a plan of each airplane may be incompatible.
@@ -76,13 +110,13 @@ struct ShieldSearch<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct PlanKey {
     airplane: usize,
-    candidate: Option<usize>,
+    source: PlanSource,
     fallback: u16,
 }
 
 impl PlanKey {
     fn new(airplane: usize, plan: &SafeManeuver) -> Self {
-        Self { airplane, candidate: plan.candidate, fallback: plan.fallback().into() }
+        Self { airplane, source: plan.source, fallback: plan.fallback().into() }
     }
 }
 
@@ -90,6 +124,7 @@ impl<'a> ShieldSearch<'a> {
     fn new(
         group: &'a [ShieldedAircraft],
         candidates: &'a [Vec<TurnProfile>],
+        common: &[Option<CommonPlan>],
         rules: PlanRules,
     ) -> Self {
         let PlanRules { steps, dtau_s, .. } = rules;
@@ -97,12 +132,21 @@ impl<'a> ShieldSearch<'a> {
             .iter()
             .map(|aircraft| SafeManeuver::on_fallback(aircraft.clone(), steps, dtau_s))
             .collect();
-        let mut plans = fallbacks.clone();
+        let common: Vec<Option<SafeManeuver>> = group
+            .iter()
+            .zip(common)
+            .map(|(aircraft, common)| Some(common.as_ref()?.to_maneuver(aircraft.clone(), dtau_s)))
+            .collect();
+        let mut plans: Vec<SafeManeuver> = common
+            .iter()
+            .zip(&fallbacks)
+            .map(|(common, fallback)| common.as_ref().unwrap_or(fallback).clone())
+            .collect();
         for ((aircraft, profiles), plan) in group.iter().zip(candidates).zip(&mut plans) {
             if let Some(first) = profiles.first() {
-                let stored = aircraft.fallback;
-                *plan =
-                    SafeManeuver::from_candidate(aircraft.clone(), first, dtau_s, Some(0), stored);
+                let stored = rules.stored_fallback(aircraft);
+                let source = PlanSource::Candidate(0);
+                *plan = SafeManeuver::from_source(aircraft.clone(), first, dtau_s, source, stored);
             }
         }
         let mut by_rank: Vec<usize> = (0..group.len()).collect();
@@ -114,6 +158,7 @@ impl<'a> ShieldSearch<'a> {
             rules,
             plans,
             fallbacks,
+            common,
             by_rank,
             near,
             answers: RefCell::default(),
@@ -138,13 +183,25 @@ impl<'a> ShieldSearch<'a> {
         if let Some(&answer) = self.answers.borrow().get(&asked) {
             return answer;
         }
-        // Unless all plans are sure to be flown, either one may fly its fallback instead.
+        // Unless all plans are sure to be flown, either one may fly its fallback instead, or what all compute for it.
         let answer = plan.is_compatible(other)
             && (self.rules.certainty == PlanCertainty::Sure
-                || (plan.is_compatible(&self.fallbacks[j])
-                    && self.fallbacks[i].is_compatible(other)));
+                || (self.settled_plans(j).all(|settled| plan.is_compatible(settled))
+                    && self.settled_plans(i).all(|settled| settled.is_compatible(other))));
         self.answers.borrow_mut().insert(asked, answer);
         answer
+    }
+
+    /// Returns the fallbacks with which the plans of an airplane may end, in the order in which they are tried.
+    fn choices(&self, i: usize) -> impl Iterator<Item = Fallback> + use<'a> {
+        let ending = self.rules.ending;
+        let all = self.group[i].choices.iter().copied();
+        all.filter(move |fallback| ending == PlanEnding::AnyFallback || fallback.is_orbiting())
+    }
+
+    /// Returns what an airplane may fly without the consent of others.
+    fn settled_plans(&self, i: usize) -> impl Iterator<Item = &SafeManeuver> {
+        std::iter::once(&self.fallbacks[i]).chain(&self.common[i])
     }
 
     fn resolve_conflicts(&mut self) {
@@ -157,11 +214,16 @@ impl<'a> ShieldSearch<'a> {
                 .with_own_fallback(loser, plan)
                 .or_else(|| self.with_other_fallbacks(loser, plan))
                 .or_else(|| self.alternative_plan(loser))
-                .unwrap_or_else(|| [(loser, self.fallbacks[loser].clone())].into());
+                .unwrap_or_else(|| [(loser, self.settled_plan(loser).clone())].into());
             pairs.retain(|(i, j)| !changes.contains_key(i) && !changes.contains_key(j));
             self.apply(changes);
             pairs.extend(self.incompatible_pairs_with(loser));
         }
+    }
+
+    /// Returns what an airplane flies if none of its candidates fits.
+    fn settled_plan(&self, i: usize) -> &SafeManeuver {
+        self.common[i].as_ref().unwrap_or(&self.fallbacks[i])
     }
 
     fn apply(&mut self, changes: PlanChanges) {
@@ -175,13 +237,13 @@ impl<'a> ShieldSearch<'a> {
         self.by_rank.iter().copied().find(|&i| self.has_to_give_way(i, pairs))
     }
 
-    /// Returns whether an airplane has to give way in some pair: to one of a higher rank, or to one on its fallback,
-    /// which never leaves it.
+    /// Returns whether an airplane has to give way in some pair: to one of a higher rank, or to one that flies none
+    /// of its candidates, which it never does again.
     fn has_to_give_way(&self, i: usize, pairs: &[(usize, usize)]) -> bool {
         let gives_way_to = |other: usize| {
-            self.plans[other].is_on_fallback() || self.group[other].rank > self.group[i].rank
+            self.plans[other].is_settled() || self.group[other].rank > self.group[i].rank
         };
-        !self.plans[i].is_on_fallback()
+        !self.plans[i].is_settled()
             && pairs
                 .iter()
                 .any(|&(a, b)| (a == i && gives_way_to(b)) || (b == i && gives_way_to(a)))
@@ -189,7 +251,7 @@ impl<'a> ShieldSearch<'a> {
 
     /// Returns a plan with another fallback, with which it is compatible with all present plans.
     fn with_own_fallback(&self, i: usize, plan: &SafeManeuver) -> Option<PlanChanges> {
-        self.group[i].choices.iter().find_map(|&fallback| {
+        self.choices(i).find_map(|fallback| {
             let plan = plan.with_fallback(fallback);
             self.is_compatible_with_all(i, &plan).then(|| [(i, plan)].into())
         })
@@ -201,14 +263,14 @@ impl<'a> ShieldSearch<'a> {
     /// Two that pass each other have to turn to the same side: to the one on which they part. If
     /// they are set to the other side, neither of them can change alone.
     fn with_other_fallbacks(&self, i: usize, plan: &SafeManeuver) -> Option<PlanChanges> {
-        self.group[i].choices.iter().find_map(|&fallback| {
+        self.choices(i).find_map(|fallback| {
             let mut changes: PlanChanges = [(i, plan.with_fallback(fallback))].into();
             let in_the_way: Vec<usize> = self.near[i]
                 .iter()
                 .copied()
                 .filter(|&j| !self.is_compatible(i, &changes[&i], j))
                 .collect();
-            if in_the_way.iter().any(|&j| self.plans[j].is_on_fallback()) {
+            if in_the_way.iter().any(|&j| self.plans[j].is_settled()) {
                 return None;
             }
             for j in in_the_way {
@@ -222,7 +284,7 @@ impl<'a> ShieldSearch<'a> {
     /// Returns the present plan of an airplane with another fallback, with which it is compatible with all, once others
     /// have changed theirs.
     fn fallback_beside(&self, j: usize, changes: &PlanChanges) -> Option<SafeManeuver> {
-        self.group[j].choices.iter().find_map(|&fallback| {
+        self.choices(j).find_map(|fallback| {
             let plan = self.plans[j].with_fallback(fallback);
             let is_compatible_with_all = self.near[j].iter().all(|&k| {
                 let other = changes.get(&k).unwrap_or(&self.plans[k]);
@@ -251,9 +313,10 @@ impl<'a> ShieldSearch<'a> {
     /// Returns the plan of an airplane with a candidate, and the stored fallback after it.
     fn candidate(&self, i: usize, k: usize) -> SafeManeuver {
         let aircraft = self.group[i].clone();
-        let stored = aircraft.fallback;
+        let stored = self.rules.stored_fallback(&aircraft);
         let profile = &self.candidates[i][k];
-        SafeManeuver::from_candidate(aircraft, profile, self.rules.dtau_s, Some(k), stored)
+        let source = PlanSource::Candidate(k);
+        SafeManeuver::from_source(aircraft, profile, self.rules.dtau_s, source, stored)
     }
 
     fn is_compatible_with_all(&self, i: usize, plan: &SafeManeuver) -> bool {
@@ -278,7 +341,7 @@ impl<'a> ShieldSearch<'a> {
 
     /// Returns a plan with a candidate that an airplane prefers to that of its present plan.
     fn better_plan(&self, i: usize) -> Option<PlanChanges> {
-        let present = self.plans[i].candidate.unwrap_or(self.candidates[i].len());
+        let present = self.plans[i].candidate().unwrap_or(self.candidates[i].len());
         (0..present).find_map(|k| self.with_other_fallbacks(i, &self.candidate(i, k)))
     }
 }

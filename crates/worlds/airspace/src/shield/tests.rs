@@ -14,7 +14,7 @@ const MAX_LEAD_S: f64 = 60.0;
 const ALL_ORBIT_S: usize = 400;
 
 fn rules(certainty: PlanCertainty) -> PlanRules {
-    PlanRules { steps: STEPS, dtau_s: DTAU_S, certainty }
+    PlanRules { steps: STEPS, dtau_s: DTAU_S, certainty, ending: PlanEnding::AnyFallback }
 }
 
 fn choices(max_lead_s: f64) -> Arc<[Fallback]> {

@@ -21,8 +21,10 @@ pub struct AirplaneSnapshot {
     pub ended: PackedFlightEnd,
     /// Number of way-points done with, overrides, orbits, and orbits in a row.
     pub counts: [u32; 4],
-    /// Side of the stored fallback.
+    /// The stored fallback.
     pub fallback: Fallback,
+    /// Whether all know it who have watched the flight.
+    pub is_tracked: bool,
     /// Altitude in meters.
     pub altitude_m: f64,
     /// Number of orders carried out, and of times that one had to wait.
@@ -86,7 +88,9 @@ impl Snapshot {
             hash_pose(&mut hasher, &airplane.pose);
             hasher.write_u64(airplane.ended.to_bits());
             airplane.counts.iter().for_each(|&n| hasher.write_u32(n));
-            hasher.write_u64(airplane.fallback.to_bits().into());
+            // Nobody has to know it unless messages get lost.
+            let tracked_bit = u64::from(airplane.is_tracked) << 16;
+            hasher.write_u64(u64::from(airplane.fallback.to_bits()) | tracked_bit);
             // Left out without orders, because the altitude then is the scenario's, or that of the
             // track.
             let [orders, waits] = airplane.orders;

@@ -3,7 +3,7 @@
 use super::Proposal;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use crate::flight::{FlightConditions, FlightLevelRange};
-use crate::shield::{PlanCertainty, ShieldedAircraft, TurnProfile};
+use crate::shield::{CommonPlan, PlanCertainty, ShieldedAircraft, TurnProfile};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
 
@@ -20,6 +20,10 @@ pub struct ObservedAircraft {
     pub aircraft: ShieldedAircraft,
     /// Whether it is seen to be on its fallback.
     pub is_on_orbit: bool,
+    /// Whether its stored fallback is known to all that see it.
+    pub is_fallback_known: bool,
+    /// The plan that all compute for it, if it has one: it flies that rather than its fallback.
+    pub common: Option<CommonPlan>,
     /// Whether it takes part in the exchange, so that it may be heard.
     pub takes_part: bool,
     /// Its airspeed by its filed flight, in meters per second.

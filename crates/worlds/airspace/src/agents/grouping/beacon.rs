@@ -4,7 +4,7 @@ use crate::agents::intent::Intent;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use crate::flight::{KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::shield::OrbitSide;
+use crate::shield::{Fallback, OrbitSide};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntityId;
 
@@ -22,6 +22,18 @@ pub struct SurveillanceReport {
     pub altitude_m: f64,
     /// The side to which it turns, if it is seen to be on its stored orbit.
     pub orbit: Option<OrbitSide>,
+    /// What all know who have watched it from its start; none after a plan that only those know who have heard it, and
+    /// where airplanes have no common plans.
+    pub tracked: Option<TrackedState>,
+}
+
+/// The part of an airplane's state that follows from its flight up to now and from its filed flight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TrackedState {
+    /// Number of way-points done with.
+    pub next: u32,
+    /// Its stored fallback.
+    pub fallback: Fallback,
 }
 
 impl SurveillanceReport {
@@ -29,6 +41,12 @@ impl SurveillanceReport {
     pub(crate) fn as_known_aircraft(&self) -> KnownAircraft {
         let &Self { id, pose, altitude_m, .. } = self;
         KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m }
+    }
+
+    /// Returns the knowledge of it of those that have watched its flight.
+    pub(crate) fn as_tracked_aircraft(&self) -> KnownAircraft {
+        let next = self.tracked.map_or(0, |tracked| tracked.next as usize);
+        KnownAircraft { next, ..self.as_known_aircraft() }
     }
 
     /// Returns the knowledge of it once it has sent its intentions.

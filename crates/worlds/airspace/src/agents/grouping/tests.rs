@@ -69,6 +69,7 @@ fn sighted(place: usize) -> SurveillanceReport {
         pose,
         altitude_m: 0.0,
         orbit: (place == 1).then_some(OrbitSide::Left),
+        tracked: None,
     }
 }
 

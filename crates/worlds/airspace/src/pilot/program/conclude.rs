@@ -76,7 +76,8 @@ impl Pilot {
         if !self.world.shield {
             let profile = state.candidates.profiles.first().cloned().unwrap_or_default();
             let fallback = state.percept.own.fallback;
-            state.control.maneuver = Maneuver::Profile { candidate: 0, profile, fallback };
+            state.control.maneuver =
+                Maneuver::Profile { candidate: 0, profile, fallback, is_common: false };
             self.finish_cycle();
         }
     }
@@ -135,6 +136,7 @@ impl Pilot {
         self.memory.contacts = match outcome {
             Some(ConversationOutcome::Exchange(ShieldExchangeResult {
                 decision,
+                common,
                 held_back,
                 contacts,
             })) => {
@@ -142,8 +144,10 @@ impl Pilot {
                     let event = Event::new(state.percept.cycle, EventKind::HeldBack, self.id);
                     state.control.events.push(event);
                 }
-                state.control.maneuver =
-                    Maneuver::from_decision(decision, allowed, &state.candidates);
+                state.control.maneuver = match common {
+                    Some(plan) => Maneuver::from_common_plan(plan),
+                    None => Maneuver::from_decision(decision, allowed, &state.candidates),
+                };
                 contacts
             }
             // Without an agreement it no longer knows where any other airplane is.
@@ -183,7 +187,8 @@ impl Pilot {
                 continue;
             };
             let known = one.with_intent(intent);
-            options.push(world.action_predictions(known, &own.common.non_cooperative));
+            let predictions = world.action_predictions(known, &own.common.non_cooperative);
+            options.push(predictions.with_deviation_weight(own.common.deviation_weights[place]));
             if world.network.is_some() && one.id != self.id {
                 record_beacon(&mut self.memory.contacts, one.id, beacon(world, known), now);
             }

@@ -6,6 +6,7 @@ use crate::agents::traffic_state::TrafficPicture;
 use crate::agents::{Conversation, ConversationEnd};
 use crate::decide::ManeuverCandidates;
 use crate::events::{Event, EventKind};
+use crate::pilot::common_plans::CommonPlans;
 use crate::pilot::control::AirplaneControl;
 use crate::pilot::conversations::{ConversationOutcome, DynParticipant};
 use crate::pilot::percept::{Percept, SurveillanceReport};
@@ -24,6 +25,8 @@ pub(super) struct PilotCycleState {
     pub(super) unheard: Vec<SurveillanceReport>,
     pub(super) phase: PilotCyclePhase,
     pub(super) candidates: ManeuverCandidates,
+    /// What all compute for each member, from what all see.
+    pub(super) plans: CommonPlans,
     /// Its control, as far as that is decided.
     pub(super) control: AirplaneControl,
 }

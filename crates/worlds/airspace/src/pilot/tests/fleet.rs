@@ -200,11 +200,13 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
         candidate: 0,
         profile: crate::shield::TurnProfile { omegas_rad_s },
         fallback: crate::shield::Fallback::default(),
+        is_common: false,
     };
     let falls_back_far_away = Maneuver::Profile {
         candidate: 0,
         profile: crate::shield::TurnProfile { omegas_rad_s: vec![0.0; 5] },
         fallback: crate::shield::Fallback::after_straight(100, crate::shield::OrbitSide::Left),
+        is_common: false,
     };
     let wrong: [(Vec<AirplaneControl>, &str); 8] = [
         (changed(&|control| control.id = 9), "it does not decide in this cycle"),
@@ -214,7 +216,7 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
         (changed(&|control| control.maneuver = profile(vec![9.0; 5])), "a turn rate of 9"),
         (
             changed(&|control| control.maneuver = falls_back_far_away.clone()),
-            "orbits after 100 cycles; give one that does after at most 0",
+            "orbits after 100 cycles; give one that does after at most 11",
         ),
         (
             changed(&|control| control.maneuver = profile(vec![0.001; 5])),
