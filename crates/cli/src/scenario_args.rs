@@ -29,12 +29,21 @@ pub(crate) struct ImportArgs {
     /// Folder with airports.dat, fix.dat and nav.dat of BlueSky, for the places that a .scn file names
     #[arg(long, value_name = "DIR")]
     navdata: Option<PathBuf>,
+
+    /// Folder openap/data of an installed OpenAP, for the types of aircraft that a .scn file names: what a type cannot fly is
+    /// clipped and counted [without: types are not used]
+    #[arg(long, value_name = "DIR")]
+    openap: Option<PathBuf>,
 }
 
 impl ImportArgs {
     /// Returns the options as overrides, `key=value`.
-    fn settings(&self) -> Option<String> {
-        self.navdata.as_ref().map(|folder| format!("import.navdata={}", folder.display()))
+    fn settings(&self) -> impl Iterator<Item = String> {
+        let navdata =
+            self.navdata.as_ref().map(|folder| format!("import.navdata={}", folder.display()));
+        let openap =
+            self.openap.as_ref().map(|folder| format!("import.openap={}", folder.display()));
+        navdata.into_iter().chain(openap)
     }
 
     /// Refuses the options for a command that has no use for them.
@@ -42,11 +51,13 @@ impl ImportArgs {
     /// # Errors
     /// When one is given.
     pub(crate) fn check_none(&self, because: &str) -> Result<(), InputError> {
-        if self.navdata.is_none() {
+        let given = [("--navdata", self.navdata.is_some()), ("--openap", self.openap.is_some())];
+        let Some((option, _)) = given.into_iter().find(|(_, is_given)| *is_given) else {
             return Ok(());
-        }
-        let remedy = "run the file once with --navdata and --out DIR, then give DIR/scenario.toml";
-        Err(InputError::new("--navdata", because, remedy))
+        };
+        let remedy =
+            format!("run the file once with {option} and --out DIR, then give DIR/scenario.toml");
+        Err(InputError::new(option, because, remedy))
     }
 }
 

@@ -23,6 +23,7 @@ pub mod mesh;
 pub mod movingai;
 pub mod mrclam;
 mod named_file;
+pub mod openap;
 mod pixel_map;
 mod pnm;
 mod raycast;

@@ -42,7 +42,7 @@ pub(crate) struct InspectArgs {
     clean: Option<PathBuf>,
 
     /// Set an option of an import, as for `run`: import.max_gap_s=600, import.ground_speed_kt=30 or
-    /// import.leave_out_suspicious=true of recorded traffic, import.navdata=DIR of a BlueSky file
+    /// import.leave_out_suspicious=true of recorded traffic, import.navdata=DIR and import.openap=DIR of a BlueSky file
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
 }

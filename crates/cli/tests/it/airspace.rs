@@ -287,6 +287,54 @@ fn a_bluesky_file_calls_files_beside_it_and_finds_places_in_the_users_tables() {
     );
 }
 
+/// A type of OpenAP whose files have only what is read of them.
+fn write_openap(place: &TestFolder) {
+    for folder in ["openap", "openap/aircraft", "openap/wrap"] {
+        std::fs::create_dir(place.path(folder)).expect("made");
+    }
+    place.write(
+        "openap/aircraft/a320.yml",
+        "vmo: 350\nmmo: 0.82\nceiling: 12500\ncruise:\n  height: 11000\n  mach: 0.78\n",
+    );
+    place.write(
+        "openap/wrap/a320.txt",
+        "ic_vs_avg initial_climb Mean vertical rate 12.59 9.15 10.0 norm 12.59|2.09\n\
+         fa_va_avg final_approach Mean airspeed 72 67 77 norm 72.43|3.49\n",
+    );
+}
+
+#[test]
+fn a_bluesky_file_flies_within_the_limits_of_openaps_types_where_they_are_given() {
+    let place = TestFolder::new();
+    write_openap(&place);
+    place.write(
+        "a.scn",
+        "00:00:00>CRE A1,A320,52.0,4.0,090,FL300,270\n00:00:00>DEST A1 52.0 6.0\n\
+         00:00:20>SPD A1 M0.9\n00:00:30>ALT A1 FL350 4000\n\
+         00:00:00>CRE A2,XY99,53.0,4.0,090,FL300,270\n00:00:00>DEST A2 53.0 6.0\n",
+    );
+    let without = in_one_line(&place.run(&["check", "a.scn"]).out());
+    assert!(without.contains("types of aircraft"), "{without}");
+    let with = place.run(&["check", "a.scn", "--openap", "openap"]);
+    assert_eq!(with.code(), 0, "{}", with.err());
+    let with = in_one_line(&with.out());
+    assert!(!with.contains("types of aircraft:"), "{with}");
+    for words in [
+        "types that OpenAP does not have, XY99",
+        "speeds beyond what the type can fly",
+        "vertical speeds beyond what the type can fly",
+    ] {
+        assert!(with.contains(words), "{words}: {with}");
+    }
+    let ran = place.json(&["run", "a.scn", "--openap", "openap", "--cycles", "60", "--out", "a"]);
+    assert_eq!(ran["metrics"]["airplanes"], 2, "{ran}");
+    // The run folder needs no OpenAP.
+    std::fs::remove_dir_all(place.path("openap")).expect("removed");
+    assert_eq!(place.run(&["check", "a/scenario.toml"]).code(), 0);
+    let sweep = place.run(&["run", "a.scn", "--openap", "openap", "--replicate", "2"]);
+    assert!(sweep.err().contains("run the file once with --openap"), "{}", sweep.err());
+}
+
 /// Returns a text without the line ends that fit it to a terminal.
 fn in_one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")

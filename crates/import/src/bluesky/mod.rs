@@ -54,6 +54,10 @@ use text::ScnText;
 /// The rule of a report for commands that have no effect on what flies.
 pub const DISPLAY_RULE: &str = "commands that change or ask a display only";
 
+/// The rule of types of aircraft, which a world that knows them takes out of the report.
+pub const TYPES_RULE: &str =
+    "types of aircraft: each flies with the speeds and climbs of its commands";
+
 /// The maximum size of a scenario in bytes after decompression: some 160 times the longest known.
 pub const MAX_SCN_BYTES: u64 = 1 << 24;
 

@@ -18,6 +18,8 @@ mod errors;
 mod flight;
 mod levels;
 mod orders;
+#[cfg(test)]
+mod performance_tests;
 mod protect;
 mod step;
 

@@ -4,8 +4,8 @@ use super::scenario::CompiledAirspace;
 use sidestep_kernel::InputError;
 use sidestep_scenario::{Bundle, ResolvedScenario, Source};
 
-/// Returns the scenario as it ran. It names no other file, but its number of cycles may follow from
-/// the flights.
+/// Returns the scenario as it ran. Its number of cycles may follow from the flights, and types of airplanes are stored as
+/// they were read: a later version may have other built-in ones.
 ///
 /// # Errors
 /// When the text is no longer a valid scenario.
@@ -13,5 +13,10 @@ pub(crate) fn resolve_scenario(
     source: &Source,
     compiled: &CompiledAirspace,
 ) -> Result<ResolvedScenario, InputError> {
-    Bundle::new(source, compiled.seed, compiled.cycles).finish()
+    let mut bundle = Bundle::new(source, compiled.seed, compiled.cycles);
+    if let Some(types) = compiled.types_text() {
+        let path = bundle.add("types.toml", types.into_bytes());
+        bundle.set("airspace.types_file", format_args!("{path:?}"));
+    }
+    bundle.finish()
 }

@@ -218,7 +218,7 @@ pub(super) fn candidates_for_group(
 
 /// Returns all the different turn profiles of the next `dt` that the actions of an airplane have.
 pub(super) fn possible_profiles(world: &AirspaceWorld, known: KnownAircraft) -> Vec<TurnProfile> {
-    preferences::turn_profiles_from_actions(world, known, world.actions(known.slot))
+    preferences::turn_profiles_from_actions(world, known, &world.present_actions(known))
 }
 
 /// Returns the turn profile straight to the next way-point, for an airplane that avoids nobody.

@@ -3,10 +3,17 @@
 //! Positions are in meters on a plane, or latitudes and longitudes in degrees on the earth. All airplanes of a scenario
 //! have them in the same form, which makes it planar or geographic.
 
+pub(super) mod limits;
+
 use super::flight::{
-    FlightOrder, FlightTask, MAX_ORDERS, Surface, Track, TrackPoint, coordinates_from_degrees,
+    FlightOrder, FlightTask, MAX_ORDERS, Performance, Surface, Track, TrackPoint,
+    coordinates_from_degrees,
 };
-use super::settings::{SeparationM, Speed, TurnCount, TurnRate};
+use super::settings::{
+    AbilityKeys, AltitudeLimit, Bank, PositiveRate, SeparationM, Speed, SpeedLimit, TurnCount,
+    TurnRate, ability_keys,
+};
+use limits::{LevelChange, Mistake, level_order_mistake, speed_order_mistake};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::{InputError, math};
@@ -46,10 +53,29 @@ pub(super) struct AirplaneSection {
     /// Orders on its way, one thing each.
     #[serde(default)]
     orders: Vec<Spanned<OrderSection>>,
+    /// Its type: one of the table of types_file, of OpenAP, or of the built-in ones.
+    #[serde(rename = "type")]
+    pub(super) type_name: Option<Spanned<String>>,
     /// Speed, if not that of all.
     pub(super) v_m_s: Option<Number<Speed>>,
     /// Greatest turn rate, if not that of all.
     pub(super) omega_max_deg_s: Option<Number<TurnRate>>,
+    /// Greatest bank in turns: at any speed, turns pull no more to the side than at that bank.
+    pub(super) bank_max_deg: Option<Number<Bank>>,
+    /// Smallest airspeed: it stalls below.
+    pub(super) v_min_m_s: Option<SpeedLimit>,
+    /// Greatest airspeed.
+    pub(super) v_max_m_s: Option<SpeedLimit>,
+    /// Greatest rate of climb.
+    pub(super) climb_max_m_s: Option<PositiveRate>,
+    /// Greatest rate of descent, positive.
+    pub(super) descent_max_m_s: Option<PositiveRate>,
+    /// Lowest altitude.
+    pub(super) floor_m: Option<AltitudeLimit>,
+    /// Highest altitude.
+    pub(super) ceiling_m: Option<AltitudeLimit>,
+    /// Greatest change of airspeed; without it speeds change at once.
+    pub(super) acceleration_m_s2: Option<PositiveRate>,
     /// Distance that others have to keep, if not that of all.
     pub(super) separation_m: Option<SeparationM>,
     /// Number of turn rates to choose from, if not that of all.
@@ -115,6 +141,11 @@ fn coordinates_of(source: &Source, at: &Spanned<LatLonDeg>) -> Result<[f64; 2], 
 const MAX_CALLSIGN_CHARS: usize = 40;
 
 impl AirplaneSection {
+    /// Returns the abilities that its own keys give.
+    pub(super) fn abilities(&self) -> AbilityKeys {
+        ability_keys!(self)
+    }
+
     /// Returns whether it avoids nobody, under either name of the key.
     pub(super) fn is_non_cooperative(&self, source: &Source) -> Result<bool, InputError> {
         let Some(intruder) = &self.intruder else {
@@ -259,8 +290,15 @@ impl AirplaneSection {
     }
 
     /// Returns its orders, and the time at which it is removed.
-    pub(super) fn orders(&self, source: &Source) -> Result<OrdersAndRemovalTime, InputError> {
+    /// They are for an airplane with this performance, whose first level is at `altitude_m`.
+    pub(super) fn orders(
+        &self,
+        source: &Source,
+        performance: &Performance,
+        altitude_m: f64,
+    ) -> Result<OrdersAndRemovalTime, InputError> {
         let mut orders = Vec::new();
+        let mut level_m = altitude_m;
         let mut leaves_s = f64::INFINITY;
         let mut last_s = 0.0;
         for section in &self.orders {
@@ -281,10 +319,18 @@ impl AirplaneSection {
             }
             let way_points_deg = coordinates(source, order.way_points_deg.as_ref())?;
             let task = order.parse_task(way_points_deg);
-            match task.map_err(|(cause, remedy)| error(cause, remedy))? {
-                Some(task) => orders.push(FlightOrder { at_s, task }),
-                None => leaves_s = at_s,
+            let Some(mut task) = task.map_err(|(cause, remedy)| error(cause, remedy))? else {
+                leaves_s = at_s;
+                continue;
+            };
+            if let Some((cause, remedy)) = order.limit_mistake(&task, performance, level_m) {
+                return Err(error(&cause, &remedy));
             }
+            if let FlightTask::Altitude { altitude_m, climb_m_s } = &mut task {
+                *climb_m_s = climb_m_s.min(performance.vertical_max_m_s(*altitude_m > level_m));
+                level_m = *altitude_m;
+            }
+            orders.push(FlightOrder { at_s, task });
         }
         if orders.len() > MAX_ORDERS {
             let span = self.orders.last().map(Spanned::span);
@@ -303,6 +349,24 @@ pub(super) fn mixed_positions(source: &Source, span: Range<usize>) -> InputError
 }
 
 impl OrderSection {
+    /// Returns what an airplane on a level could not do of a task, if there is something.
+    fn limit_mistake(
+        &self,
+        task: &FlightTask,
+        performance: &Performance,
+        level_m: f64,
+    ) -> Option<Mistake> {
+        match task {
+            FlightTask::Speed(v_m_s) => speed_order_mistake(performance, *v_m_s),
+            FlightTask::Altitude { altitude_m, .. } => {
+                let climb_m_s = self.climb_m_s.map(f64::from);
+                let change = LevelChange { from_m: level_m, to_m: *altitude_m, climb_m_s };
+                level_order_mistake(performance, change)
+            }
+            _ => None,
+        }
+    }
+
     /// Returns the one task of the order; `None` for leaving. `on_earth` are the coordinates of its way-points in
     /// degrees.
     fn parse_task(

@@ -1,6 +1,6 @@
 //! Generated traffic: the super-conflict, random crossings, and converging streams.
 
-use super::flight::{AircraftModel, AirplaneStart, Point, Pose2, distance_m};
+use super::flight::{AircraftModel, AirplaneStart, Performance, Point, Pose2, distance_m};
 use super::purpose;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,6 +32,7 @@ pub(super) struct GeneratorParams<'a> {
     pub(super) radius_m: f64,
     pub(super) jitter_m: f64,
     pub(super) model: &'a AircraftModel,
+    pub(super) performance: &'a Performance,
     /// Further meters between the starts of random traffic, for errors that the shield allows for.
     pub(super) errors_m: f64,
 }
@@ -54,6 +55,7 @@ fn airplane(params: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airpla
     AirplaneStart {
         callsign: None,
         model: params.model.clone(),
+        performance: params.performance.clone(),
         start: Pose2 { at: from, heading_rad },
         mission: to,
         altitude_m: 0.0,

@@ -1,11 +1,14 @@
 //! Traffic in other programs' files, read as scenarios.
 
 use super::traffic::{
-    ImportedScenarioSettings, from_bluesky, from_tracks, omitted_commands, settings_from_bluesky,
+    BlueskyScenario, ClipCounts, ImportedScenarioSettings, ImportedTypes, from_bluesky_with_types,
+    from_tracks, omitted_commands, settings_from_bluesky,
 };
 use serde_json::{Value, json};
 use sidestep_import::Treatment;
-use sidestep_import::bluesky::{self, DISPLAY_RULE, ScnFile, ScnOptions, UnresolvedPosition};
+use sidestep_import::bluesky::{
+    self, DISPLAY_RULE, ScnFile, ScnOptions, TYPES_RULE, UnresolvedPosition,
+};
 use sidestep_import::report::{Finding, ImportReport};
 use sidestep_import::traffic::{self, RecordedTraffic, TrafficOptions};
 use sidestep_kernel::InputError;
@@ -46,11 +49,21 @@ pub(super) fn import_file(
     let (scenario, report, (mut json, lines)) = match traffic_file_format(file) {
         TrafficFileFormat::Other => return Ok(None),
         TrafficFileFormat::Bluesky => {
-            let scn = bluesky::read_with(file, &bluesky_options(file, options)?)?;
+            let chosen = bluesky_options(file, options)?;
+            let scn = bluesky::read_with(file, &chosen.reading)?;
+            let types = match &chosen.openap {
+                Some(folder) => ImportedTypes::load(folder, &scn)?,
+                None => ImportedTypes::default(),
+            };
             let settings = settings_from_bluesky(&file.display().to_string(), &scn);
-            let report = full_report(&scn, &settings);
+            let mut report = full_report(&scn, &settings);
             reasons = EmptyFileReasons::new(&scn, &settings);
-            (from_bluesky(&name, &scn), report.clone(), bluesky_report(&scn, &settings, &report))
+            let converted = from_bluesky_with_types(&name, &scn, &types);
+            if let Some(BlueskyScenario { clipped, .. }) = &converted {
+                record_types(&mut report, &types, *clipped);
+            }
+            let text = converted.map(|converted| converted.text);
+            (text, report.clone(), bluesky_report(&scn, &settings, &report))
         }
         TrafficFileFormat::Tracks => {
             let tracks = traffic::read_with(file, &TrafficOptions::from_import(file, options)?)?;
@@ -209,16 +222,49 @@ fn unresolved_uses(scn: &ScnFile) -> Vec<String> {
     texts
 }
 
-/// Returns the options of an import for a BlueSky file.
-fn bluesky_options(file: &Path, options: &ImportOptions) -> Result<ScnOptions, InputError> {
-    let mut chosen = ScnOptions::default();
-    for (key, value) in options.iter() {
-        if key != "navdata" {
-            let cause = format!("`import.{key}` is no option of a BlueSky file");
-            let remedy = "its only option is `import.navdata`, the folder of a navigation database";
-            return Err(InputError::new(file.display(), cause, remedy).with_key(key));
+/// Adds to the report what types of aircraft have changed.
+fn record_types(report: &mut ImportReport, types: &ImportedTypes, clipped: ClipCounts) {
+    if types.has_any() {
+        report.findings.retain(|finding| finding.rule != TYPES_RULE);
+    }
+    for name in &types.unknown {
+        let remedy = "it flies without the limits of a type";
+        report.record(Treatment::NotUsed, "types that OpenAP does not have", name.as_str(), remedy);
+    }
+    let ClipCounts { speeds, altitudes, vertical_speeds } = clipped;
+    let rules = [
+        ("speeds beyond what the type can fly", speeds),
+        ("altitudes above the ceiling of the type", altitudes),
+        ("vertical speeds beyond what the type can fly", vertical_speeds),
+    ];
+    for (rule, count) in rules {
+        for _ in 0..count {
+            report.record(Treatment::Repaired, rule, "", "clipped to the limit of the type");
         }
-        chosen.navdata = Some(value.into());
+    }
+}
+
+/// The options of an import of a BlueSky file.
+struct BlueskyOptions {
+    reading: ScnOptions,
+    /// The folder `data` of OpenAP, which has the types of aircraft.
+    openap: Option<String>,
+}
+
+/// Returns the options of an import for a BlueSky file.
+fn bluesky_options(file: &Path, options: &ImportOptions) -> Result<BlueskyOptions, InputError> {
+    let mut chosen = BlueskyOptions { reading: ScnOptions::default(), openap: None };
+    for (key, value) in options.iter() {
+        match key {
+            "navdata" => chosen.reading.navdata = Some(value.into()),
+            "openap" => chosen.openap = Some(value.into()),
+            _ => {
+                let cause = format!("`import.{key}` is no option of a BlueSky file");
+                let remedy = "its options are `import.navdata`, the folder of a navigation database, and \
+                              `import.openap`, the folder openap/data of an installed OpenAP";
+                return Err(InputError::new(file.display(), cause, remedy).with_key(key));
+            }
+        }
     }
     Ok(chosen)
 }

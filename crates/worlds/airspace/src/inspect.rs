@@ -111,12 +111,14 @@ impl Inspector<'_> {
         } else {
             "all others near it"
         };
+        let performance = &self.world.airplanes[self.id as usize].performance;
         let next = current.next.get() as usize;
         let ahead = segment.mission.get(next);
         inspection.add_section(
             FactSection::new("Now")
                 .fact("place", self.point_on_level(current.pose().at))
                 .fact("heading", FactValue::degrees(current.pose().heading_rad))
+                .fact_if("type", performance.type_name.clone())
                 .fact("airspeed", FactValue::number(segment.model.v_m_s, "m/s"))
                 .fact("separation", FactValue::meters(segment.model.separation_m))
                 .fact(

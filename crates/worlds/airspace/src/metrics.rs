@@ -265,7 +265,7 @@ pub fn airplane_metrics(
         shield_overrides: airplane.overrides.get(),
         shield_orbits: airplane.orbits.get(),
         left: airplane.has_left(),
-        orders: airplane.orders.get(),
+        orders: world.airplanes[id as usize].whole_orders(airplane.orders.get()),
         orders_delayed: airplane.waits.get(),
     }
 }

@@ -6,9 +6,11 @@ mod earth;
 mod effectless;
 mod network;
 mod optimizer;
+mod performance;
 mod remarks;
 mod rule_changes;
 mod start_groups;
+mod types;
 
 use super::flight::AirplaneStart;
 use super::flight_plan::AirplaneSection;
@@ -39,6 +41,7 @@ use sidestep_scenario::{
     schema,
 };
 use std::sync::Arc;
+use types::TypeTable;
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
@@ -112,6 +115,10 @@ struct AirspaceSection {
     /// The true minimum of the objective is recorded for groups of up to this many airplanes.
     minimum_up_to: Option<Integer<0, 8>>,
     vertical_m: Option<Number<LevelGap>>,
+    /// File of types of airplanes: [types.NAME] with the keys of [airplane] for each.
+    types_file: Option<Spanned<String>>,
+    /// Folder openap/data of an installed OpenAP, with types of airliners by their ICAO designators.
+    openap_folder: Option<Spanned<String>>,
     replay_until_s: Option<Number<ReplayUntilRange>>,
     group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
@@ -179,8 +186,20 @@ struct ParsedScenario {
     source: Source,
     head: Head,
     file: AirspaceFile,
+    /// The types of airplanes that it names.
+    types: TypeTable,
     /// Methods beside the built-in ones.
     own: Methods,
+}
+
+impl ParsedScenario {
+    /// Returns a digest of all that decides how airplanes fly: the text, the seed, and the types from other files.
+    fn fingerprint(&self, seed: u64) -> u64 {
+        if self.types.is_empty() {
+            return fingerprint(&self.source.text, seed);
+        }
+        fingerprint(&format!("{}{}", self.source.text, self.types.text()), seed)
+    }
 }
 
 impl CompiledAirspace {
@@ -198,7 +217,8 @@ impl CompiledAirspace {
     /// The same.
     pub fn with_methods(source: &Source, own: &Methods) -> Result<Self, InputError> {
         let (head, file) = source.parse_world::<AirspaceFile>()?;
-        let recipe = ParsedScenario { source: source.clone(), head, file, own: own.clone() };
+        let types = TypeTable::load(source, &file)?;
+        let recipe = ParsedScenario { source: source.clone(), head, file, types, own: own.clone() };
         Compiler::new(&Arc::new(recipe)).compile()
     }
 
@@ -213,13 +233,19 @@ impl CompiledAirspace {
         if is_drawn || self.world.disturbance.position_m > 0.0 {
             return Compiler::with_seed(&self.recipe, seed, &self.world).compile();
         }
-        let fingerprint = fingerprint(&self.recipe.source.text, seed);
+        let fingerprint = self.recipe.fingerprint(seed);
         let reseeded =
             |world: &AirspaceWorld| AirspaceWorld { streams, fingerprint, ..world.clone() };
         let later = self.world.later_rules.iter().map(|(from, later)| (*from, reseeded(later)));
         let later_rules = Arc::new(later.collect());
         let world = Arc::new(AirspaceWorld { later_rules, ..reseeded(&self.world) });
         Ok(Self { world, seed, ..self.clone() })
+    }
+
+    /// Returns a file with the types of airplanes that it names; `None` if it names none.
+    pub(super) fn types_text(&self) -> Option<String> {
+        let types = &self.recipe.types;
+        (!types.is_empty()).then(|| types.text())
     }
 
     /// Returns the state at the start.

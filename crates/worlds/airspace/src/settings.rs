@@ -1,12 +1,16 @@
 //! Choices and numbers that a scenario makes and that lower layers depend on.
 
+mod abilities;
 mod values;
 
+pub(crate) use abilities::{
+    AbilityKeys, AltitudeLimit, PositiveRate, SpeedLimit, TypeSection, ability_keys,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder, Utility};
 pub(crate) use values::{
-    Cooling, Decision, Fading, Gibibytes, HeadingNoise, Held, Inflation, LevelGap, LookAhead,
+    Bank, Cooling, Decision, Fading, Gibibytes, HeadingNoise, Held, Inflation, LevelGap, LookAhead,
     RoundCount, SeparationM, Speed, Step, Tolerance, TurnCount, TurnRate, Weight,
 };
 

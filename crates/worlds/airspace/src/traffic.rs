@@ -10,13 +10,17 @@
 mod bluesky;
 mod flyable_aircraft;
 mod import_settings;
+mod imported_types;
 mod position;
 mod recorded;
 mod scn_flight;
 
 pub use bluesky::from_bluesky;
-pub(crate) use bluesky::{omitted_commands, settings_from_bluesky};
+pub(crate) use bluesky::{
+    BlueskyScenario, from_bluesky_with_types, omitted_commands, settings_from_bluesky,
+};
 pub(crate) use import_settings::ImportedScenarioSettings;
+pub(crate) use imported_types::{ClipCounts, ImportedTypes};
 pub use recorded::from_tracks;
 
 use super::flight::SeparationMinima;

@@ -5,10 +5,10 @@ mod solo_flight;
 mod tests;
 
 use super::flight::{
-    Action, AirplaneStart, Chart, DetourAlternatives, FlightConditions, FlightLevelRange,
-    FlightPhase, FlightTask, InterOrderSegment, KnownAircraft, Point, Pose2, RoutePosition,
+    Action, AirplaneStart, Chart, DetourAlternatives, DoneOrders, FlightConditions,
+    FlightLevelRange, FlightPhase, InterOrderSegment, KnownAircraft, Point, Pose2, RoutePosition,
     SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, actions,
-    segments_after_orders,
+    actions_at_turn_rate, segments_after_orders,
 };
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
@@ -20,6 +20,7 @@ use sidestep_kernel::control::AgentTeams;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// The immutable world, shared by all runs of a scenario.
@@ -179,8 +180,9 @@ impl AirspaceWorld {
     /// Returns the turn rates at which airplanes orbit under the shield.
     fn orbits_rad_s(&self) -> Vec<f64> {
         let mut rates: Vec<f64> = Vec::with_capacity(self.airplanes.len());
-        for AirplaneStart { model, .. } in &*self.airplanes {
-            let max_rad_s = self.bounds.max_orbit_rate_rad_s(model, self.timing.dt_s);
+        for airplane in &*self.airplanes {
+            let model = airplane.least_turning_model();
+            let max_rad_s = self.bounds.max_orbit_rate_rad_s(&model, self.timing.dt_s);
             rates.push(max_rad_s.filter(|_| self.shield).unwrap_or(model.omega_max_rad_s));
         }
         // Only airplanes that may come to orbit have to share a rate.
@@ -253,11 +255,7 @@ impl AirspaceWorld {
     fn max_speed_m_s(&self, i: usize) -> f64 {
         let airplane = &self.airplanes[i];
         let recorded = airplane.track.as_ref().map_or(0.0, Track::max_speed_m_s);
-        let ordered = airplane.orders.iter().filter_map(|order| match order.task {
-            FlightTask::Speed(v_m_s) => Some(v_m_s),
-            _ => None,
-        });
-        ordered.fold(airplane.model.v_m_s.max(recorded), f64::max)
+        airplane.planned_speeds_m_s().fold(recorded, f64::max)
     }
 
     /// Returns how positions are drawn.
@@ -402,7 +400,13 @@ impl AirspaceWorld {
             None => {
                 let AirplaneStart { model, mission, altitude_m, .. } =
                     &self.airplanes[slot as usize];
-                InterOrderSegment { model, mission, altitude_m: *altitude_m, climb_m_s: 0.0 }
+                InterOrderSegment {
+                    model,
+                    mission,
+                    altitude_m: *altitude_m,
+                    climb_m_s: 0.0,
+                    descent_m_s: 0.0,
+                }
             }
         }
     }
@@ -416,18 +420,25 @@ impl AirspaceWorld {
         next: usize,
         now_s: f64,
     ) -> (u32, usize) {
-        let mut orders = orders;
+        let mut done = DoneOrders::at_cycle_start(orders as usize);
         let mut next = next;
-        while self.airplanes[slot].due_order(orders as usize, now_s).is_some() {
-            next = self.later[slot][orders as usize].next.map_or(next, |next| next as usize);
-            orders += 1;
+        while let Some(order) = self.airplanes[slot].due_order(done, now_s) {
+            next = self.later[slot][done.count].next.map_or(next, |next| next as usize);
+            done = done.and(order);
         }
-        (orders, next)
+        (done.count as u32, next)
     }
 
-    /// Returns the actions of an airplane, for others that know its model.
+    /// Returns the actions of an airplane at the speed of its start, for others that know its model.
     pub(crate) fn actions(&self, slot: EntitySlot) -> &[Action] {
         &self.actions[slot as usize]
+    }
+
+    /// Returns the actions of an airplane at the speed that it has: as many, in the same order.
+    pub(crate) fn present_actions(&self, known: KnownAircraft) -> Cow<'_, [Action]> {
+        let present = self.segment(known.slot, known.orders).model;
+        let start = &self.airplanes[known.slot as usize].model;
+        actions_at_turn_rate(self.actions(known.slot), start, present.omega_max_rad_s)
     }
 
     /// Returns the levels that an airplane is on, or passes as far as the method looks ahead.
@@ -443,9 +454,9 @@ impl AirspaceWorld {
         non_cooperative: &[NonCooperativeAircraft],
     ) -> ActionPredictions {
         let InterOrderSegment { model, mission, .. } = self.segment(known.slot, known.orders);
-        let actions = self.actions(known.slot);
+        let actions = self.present_actions(known);
         let route = RoutePosition { mission, next: known.next, pose: known.pose };
-        let predictions = self.flight_environment().predictions(model, actions, route);
+        let predictions = self.flight_environment().predictions(model, &actions, route);
         let frame = self.surface.frame_at(known.pose.at);
         ActionPredictions::new(predictions, frame, model.separation_m, self.levels(known))
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)

@@ -12,7 +12,7 @@ use crate::bluesky::traffic::{
 use crate::bluesky::values::{
     Arguments, altitude_ft, heading_deg, on_off, speed, vertical_speed_fpm,
 };
-use crate::bluesky::{Airspeed, MAX_AIRCRAFT, synthetic};
+use crate::bluesky::{Airspeed, MAX_AIRCRAFT, TYPES_RULE, synthetic};
 use crate::local_plane::{EARTH_RADIUS_M, LatLon, wrap_deg};
 use crate::report::Treatment;
 use crate::table::Token;
@@ -64,8 +64,7 @@ impl Interpreter {
         self.add_aircraft(arguments, id, aircraft)?;
         self.note_supersonic(speed, altitude_ft);
         if has_type {
-            let rule = "types of aircraft: each flies with the speeds and climbs of its commands";
-            self.note(Treatment::NotUsed, rule, "");
+            self.note(Treatment::NotUsed, TYPES_RULE, "");
         }
         if runway_deg.is_some() {
             self.note(Treatment::Guessed, RUNWAY_HEADING_RULE, "give the heading");

@@ -110,8 +110,9 @@ impl<'a> AircraftCycleMotion<'a> {
                     ConstantRateLeg::new(0.0, dtau_s, self.pose, segment.model.v_m_s, omega);
                 let to_climb_m = segment.altitude_m - self.altitude_m;
                 // A level that is reached within the step splits it into two legs.
-                let climbs_s = if segment.climb_m_s > 0.0 && to_climb_m != 0.0 {
-                    to_climb_m.abs() / segment.climb_m_s
+                let vertical_m_s = segment.vertical_m_s(self.altitude_m);
+                let climbs_s = if vertical_m_s > 0.0 && to_climb_m != 0.0 {
+                    to_climb_m.abs() / vertical_m_s
                 } else {
                     0.0
                 };

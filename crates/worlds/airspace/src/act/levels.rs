@@ -29,8 +29,8 @@ pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flo
     let PhaseContext { world, state, now, .. } = *context;
     let is_changing = |slot: EntitySlot| {
         let segment = state.segment(world, slot);
-        segment.climb_m_s > 0.0
-            && state.airplanes[slot as usize].altitude_m.get() != segment.altitude_m
+        let altitude_m = state.airplanes[slot as usize].altitude_m.get();
+        segment.vertical_m_s(altitude_m) > 0.0 && altitude_m != segment.altitude_m
     };
     for &slot in group.iter().filter(|&&slot| is_changing(slot)) {
         if !world.shield || world.is_non_cooperative(slot, now) {

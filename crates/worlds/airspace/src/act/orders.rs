@@ -5,7 +5,7 @@
 //! is accepted at once, and the way to it cleared in stages (`levels.rs`).
 
 use super::protect::shielded_aircraft;
-use crate::flight::{FlightOrder, FlightTask};
+use crate::flight::{DoneOrders, FlightOrder};
 use crate::scratch::PhaseContext;
 use crate::shield::{Fallback, ShieldedAircraft, safe_fallback};
 use sidestep_kernel::EntitySlot;
@@ -21,15 +21,15 @@ pub(super) fn execute_due_orders(
     for &slot in group.iter().filter(|&&slot| !world.is_replayed(slot, *now)) {
         let airplane = &world.airplanes[slot as usize];
         let current = &state.airplanes[slot as usize];
-        while let Some(order) =
-            airplane.due_order(current.orders.get().into(), world.cycle_start_s(*now))
-        {
+        let mut done = DoneOrders::at_cycle_start(current.orders.get().into());
+        while let Some(order) = airplane.due_order(done, world.cycle_start_s(*now)) {
             let Some(fallback) = fallback_after_order(context, flown, slot, order) else {
                 current.waits.set(current.waits.get().saturating_add(1));
                 break;
             };
-            let later = &world.later[slot as usize][usize::from(current.orders.get())];
-            current.orders.set(current.orders.get() + 1);
+            let later = &world.later[slot as usize][done.count];
+            done = done.and(order);
+            current.orders.set(done.count as u16);
             current.next.set(later.next.unwrap_or(current.next.get()));
             current.fallback.set(fallback);
         }
@@ -45,13 +45,15 @@ fn fallback_after_order(
 ) -> Option<Fallback> {
     let PhaseContext { world, state, now, .. } = context;
     let current = &state.airplanes[slot as usize];
-    let changes_safety = matches!(order.task, FlightTask::Speed(_));
-    if !world.shield || !changes_safety || world.is_non_cooperative(slot, *now) {
+    if !world.shield || order.task.speed_m_s().is_none() || world.is_non_cooperative(slot, *now) {
         return Some(current.fallback.get());
     }
     let segment = world.segment(slot, u32::from(current.orders.get()) + 1);
-    let changed =
-        ShieldedAircraft { v_m_s: segment.model.v_m_s, ..shielded_aircraft(context, slot) };
+    let changed = ShieldedAircraft {
+        v_m_s: segment.model.v_m_s,
+        omega_max_rad_s: segment.model.omega_max_rad_s,
+        ..shielded_aircraft(context, slot)
+    };
     let others = flown
         .iter()
         .filter(|&&other| other != slot)

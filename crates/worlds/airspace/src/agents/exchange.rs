@@ -127,10 +127,16 @@ impl Proposal {
         }
     }
 
+    /// Returns the airspeed of its airplane in meters per second.
+    fn v_m_s(&self, observed: &ObservedAircraft) -> f64 {
+        self.v_m_s.unwrap_or(observed.filed_v_m_s)
+    }
+
     /// Returns how its airplane describes itself, with all that others see of it or have on file.
     fn beacon(&self, observed: &ObservedAircraft) -> StateBeacon {
         StateBeacon {
-            v_m_s: self.v_m_s.unwrap_or(observed.filed_v_m_s),
+            v_m_s: self.v_m_s(observed),
+            omega_max_rad_s: observed.turn.omega_rad_s(self.v_m_s(observed)),
             levels: self.levels.unwrap_or(observed.filed_levels),
             ..StateBeacon::from_aircraft(&observed.aircraft)
         }
@@ -243,15 +249,16 @@ impl ShieldExchangeAgent {
 
     fn aircraft_from_proposal(&self, place: usize, proposal: &Proposal) -> ShieldedAircraft {
         let observed = &self.setup.aircraft[place];
-        let Proposal { v_m_s, levels, orbit_pose, fallback, exempt, rank, .. } = proposal;
+        let Proposal { levels, orbit_pose, fallback, exempt, rank, .. } = proposal;
         let seen = &observed.aircraft;
+        let v_m_s = proposal.v_m_s(observed);
         ShieldedAircraft {
             id: self.id(place),
             frame: self.setup.air.surface.frame_at(seen.pose.at),
             pose: seen.pose,
             orbit_pose: orbit_pose.unwrap_or(seen.pose),
-            v_m_s: v_m_s.unwrap_or(observed.filed_v_m_s),
-            omega_max_rad_s: seen.omega_max_rad_s,
+            v_m_s,
+            omega_max_rad_s: observed.turn.omega_rad_s(v_m_s),
             orbit_rad_s: seen.orbit_rad_s,
             separation_m: seen.separation_m,
             error_m: seen.error_m,

@@ -5,7 +5,7 @@ use super::participant::{InvalidMessage, are_valid_coordinates};
 use super::traffic_state::{LastKnownState, StateBeacon, TrafficPicture};
 use crate::flight::{
     Action, AircraftModel, FlightConditions, Frame, KnownAircraft, Point, Pose2, Prediction,
-    RoutePosition,
+    RoutePosition, TurnLimit, actions_at_turn_rate,
 };
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::objective::{ActionPredictions, Objective};
@@ -51,6 +51,8 @@ pub struct FiledFlight {
     pub actions: Vec<Action>,
     /// The knowledge that all others have of it before they have heard it.
     pub contact: LastKnownState,
+    /// The limits on its turn rate.
+    pub turn: TurnLimit,
     /// Its greatest speed in meters per second.
     pub max_speed_m_s: f64,
     /// Largest number of way-points that it is to reach under any orders.
@@ -68,15 +70,16 @@ impl CommonKnowledge {
         mission: &[Point],
         next: usize,
     ) -> ActionPredictions {
-        let FiledFlight { model, actions, .. } = &self.filed[place];
+        let FiledFlight { model: filed, actions, .. } = &self.filed[place];
         let model = AircraftModel {
             v_m_s: beacon.v_m_s,
             omega_max_rad_s: beacon.omega_max_rad_s,
             separation_m: beacon.separation_m,
-            ..model.clone()
+            ..filed.clone()
         };
         let route = RoutePosition { mission, next, pose: beacon.pose };
-        let predictions = self.air.predictions(&model, actions, route);
+        let actions = actions_at_turn_rate(actions, filed, beacon.omega_max_rad_s);
+        let predictions = self.air.predictions(&model, &actions, route);
         let frame = self.air.surface.frame_at(beacon.pose.at);
         ActionPredictions::new(predictions, frame, beacon.separation_m, beacon.levels)
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
@@ -126,9 +129,10 @@ impl CommonKnowledge {
         place: usize,
         beacon: &StateBeacon,
     ) -> Result<(), InvalidMessage> {
-        let FiledFlight { contact, max_speed_m_s, .. } = &self.filed[place];
+        let FiledFlight { contact, turn, max_speed_m_s, .. } = &self.filed[place];
         let filed = &contact.beacon;
-        let is_filed = beacon.omega_max_rad_s == filed.omega_max_rad_s
+        // As fast as it can turn at the speed that it has.
+        let is_filed = beacon.omega_max_rad_s == turn.omega_rad_s(beacon.v_m_s)
             && beacon.orbit_rad_s == filed.orbit_rad_s
             && beacon.separation_m == filed.separation_m;
         InvalidMessage::Plan.ensure(is_filed && beacon.pose == self.poses[place])?;

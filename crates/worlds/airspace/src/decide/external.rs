@@ -19,6 +19,9 @@ pub(super) fn candidates_for_external_action(
 ) -> ManeuverCandidates {
     match external_action {
         Some(&ExternalAction::TurnRate(omega_rad_s)) => {
+            // Its bank may allow less at the speed that it has by now than at its start.
+            let max_rad_s = world.segment(known.slot, known.orders).model.omega_max_rad_s;
+            let omega_rad_s = omega_rad_s.clamp(-max_rad_s, max_rad_s);
             let omegas_rad_s = vec![omega_rad_s; world.timing.points_per_dt()];
             ManeuverCandidates::from_profiles(rank_by_similarity(
                 world,
@@ -31,7 +34,7 @@ pub(super) fn candidates_for_external_action(
             ManeuverCandidates::from_profiles(rank_by_similarity(world, known, profile))
         }
         Some(ExternalAction::Ranking(order)) => {
-            let actions = world.actions(known.slot);
+            let actions = world.present_actions(known);
             let ranked = order.iter().map(|&k| actions[usize::from(k)]).collect();
             ManeuverCandidates::from_actions(world, known, ranked)
         }

@@ -21,7 +21,7 @@ pub(super) fn rank_by_turn_difference(
     known: KnownAircraft,
     desired_rad_s: f64,
 ) -> Vec<Action> {
-    let mut others: Vec<Action> = world.actions(known.slot).to_vec();
+    let mut others: Vec<Action> = world.present_actions(known).into_owned();
     others.sort_by(|a, b| {
         rate_difference_rad_s(*a, desired_rad_s)
             .total_cmp(&rate_difference_rad_s(*b, desired_rad_s))
@@ -51,7 +51,8 @@ pub(super) fn rank_by_cost(
     order.sort_by(|a, b| {
         (a != chosen).cmp(&(b != chosen)).then(expected[*a].total_cmp(&expected[*b]))
     });
-    order.iter().map(|&k| world.actions(known.slot)[k]).collect()
+    let actions = world.present_actions(known);
+    order.iter().map(|&k| actions[k]).collect()
 }
 
 /// Returns the different motions of the next `dt` among some actions, in their order.

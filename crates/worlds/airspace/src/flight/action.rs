@@ -2,6 +2,7 @@
 
 use super::motion::AircraftModel;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::fmt;
 
 /// An action: a turn rate, held for some time, and then proceeding to the way-point.
@@ -45,6 +46,20 @@ impl Action {
             }
             Self::Leg { until_s, .. } => is_before(flown_s, until_s).then_some(0.0),
             Self::Proceed => None,
+        }
+    }
+
+    /// Returns the action with another turn rate, which follows from its own.
+    fn map_turn_rate(self, map: impl Fn(f64) -> f64) -> Self {
+        match self {
+            Self::Hold { omega_rad_s } => Self::Hold { omega_rad_s: map(omega_rad_s) },
+            Self::Then { omega_rad_s, hold_s } => {
+                Self::Then { omega_rad_s: map(omega_rad_s), hold_s }
+            }
+            Self::Leg { omega_rad_s, turn_s, until_s } => {
+                Self::Leg { omega_rad_s: map(omega_rad_s), turn_s, until_s }
+            }
+            Self::Proceed => Self::Proceed,
         }
     }
 }
@@ -142,6 +157,21 @@ pub fn actions(
     }
     all.push(Action::Proceed);
     all
+}
+
+/// Returns the action set of a model at another largest turn rate: the same turns, as much slower or faster.
+pub(crate) fn actions_at_turn_rate<'a>(
+    actions: &'a [Action],
+    model: &AircraftModel,
+    omega_max_rad_s: f64,
+) -> Cow<'a, [Action]> {
+    if omega_max_rad_s == model.omega_max_rad_s {
+        return Cow::Borrowed(actions);
+    }
+    let factor = omega_max_rad_s / model.omega_max_rad_s;
+    // Rounding must not lead beyond the limit, which all check.
+    let scaled = |omega_rad_s: f64| (factor * omega_rad_s).clamp(-omega_max_rad_s, omega_max_rad_s);
+    actions.iter().map(|action| action.map_turn_rate(scaled)).collect()
 }
 
 /// Returns the `k`-th of a model's turn rates, from the fastest right turn to the fastest left turn.

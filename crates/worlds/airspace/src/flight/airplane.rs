@@ -2,6 +2,7 @@
 
 use super::motion::{AircraftModel, Point, Pose2};
 use super::order::{FlightOrder, FlightTask};
+use super::performance::Performance;
 use super::track::Track;
 use sidestep_kernel::EntitySlot;
 
@@ -12,6 +13,8 @@ pub struct AirplaneStart {
     pub callsign: Option<String>,
     /// Its abilities, with the speed that it has until an order changes it.
     pub model: AircraftModel,
+    /// What it can fly.
+    pub performance: Performance,
     /// The pose in which it appears.
     pub start: Pose2,
     /// Way-points in the order in which it has to reach them.
@@ -44,9 +47,61 @@ impl AirplaneStart {
         last_direction.is_some_and(|order| matches!(order.task, FlightTask::Heading(_)))
     }
 
-    /// Returns the order after the first `done` ones, if its time has come.
-    pub(crate) fn due_order(&self, done: usize, now_s: f64) -> Option<&FlightOrder> {
-        self.orders.get(done).filter(|order| order.at_s <= now_s)
+    /// Returns the order after the first `done` ones, if its time has come. Of an airplane that accelerates only the
+    /// first change of speed of a cycle is due: after orders that had to wait, one would follow the other at once.
+    pub(crate) fn due_order(&self, done: DoneOrders, now_s: f64) -> Option<&FlightOrder> {
+        let DoneOrders { count, has_changed_speed } = done;
+        let must_wait = |task: &FlightTask| {
+            has_changed_speed && self.performance.accelerates() && task.speed_m_s().is_some()
+        };
+        self.orders.get(count).filter(|order| order.at_s <= now_s && !must_wait(&order.task))
+    }
+
+    /// Returns the number of orders among the first `count`, without the speeds on the way to one.
+    pub(crate) fn whole_orders(&self, count: u16) -> u16 {
+        if !self.performance.accelerates() {
+            return count;
+        }
+        let done = self.orders.iter().take(count.into());
+        done.filter(|order| !matches!(order.task, FlightTask::Acceleration(_))).count() as u16
+    }
+
+    /// Returns the speeds with which it is planned to fly, in meters per second: that at its start and those of its
+    /// orders.
+    pub(crate) fn planned_speeds_m_s(&self) -> impl Iterator<Item = f64> {
+        let ordered = self.orders.iter().filter_map(|order| order.task.speed_m_s());
+        ordered.chain([self.model.v_m_s])
+    }
+
+    /// Returns its model with the turn rate that it can fly at any of its planned speeds.
+    pub(crate) fn least_turning_model(&self) -> AircraftModel {
+        let turn = &self.performance.turn;
+        let rates = self.planned_speeds_m_s().map(|v_m_s| turn.omega_rad_s(v_m_s));
+        let omega_max_rad_s = rates.fold(self.model.omega_max_rad_s, f64::min);
+        AircraftModel { omega_max_rad_s, ..self.model.clone() }
+    }
+}
+
+/// The orders that an airplane has carried out when it looks for the next one.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct DoneOrders {
+    /// Their number.
+    pub(crate) count: usize,
+    /// Whether one of this cycle has changed its speed.
+    pub(crate) has_changed_speed: bool,
+}
+
+impl DoneOrders {
+    /// Returns those at the start of a cycle.
+    pub(crate) fn at_cycle_start(count: usize) -> Self {
+        Self { count, has_changed_speed: false }
+    }
+
+    /// Returns those after one more.
+    #[must_use]
+    pub(crate) fn and(self, order: &FlightOrder) -> Self {
+        let changes_speed = order.task.speed_m_s().is_some();
+        Self { count: self.count + 1, has_changed_speed: self.has_changed_speed || changes_speed }
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! motion.rs                          a pose, and one step of it
+//! performance.rs  acceleration.rs    what an airplane can fly, and changes of speed that take time
 //! action.rs  autopilot.rs  air.rs    possible actions, where they lead, in which wind
 //! airplane.rs  order.rs  segment.rs  one airplane, its orders, and the flight between them
 //! track.rs  levels.rs                recorded tracks, and ranges of altitude
@@ -10,6 +11,7 @@
 //! chart.rs                           how positions are drawn
 //! ```
 
+mod acceleration;
 mod action;
 mod air;
 mod airplane;
@@ -20,13 +22,17 @@ mod levels;
 mod motion;
 mod order;
 mod pair_plane;
+mod performance;
 mod phase;
 mod segment;
 mod surface;
 mod track;
 
+pub(crate) use acceleration::SpeedChanges;
+pub(crate) use action::actions_at_turn_rate;
 pub use action::{Action, DetourAlternatives, actions};
 pub use air::{FlightConditions, RoutePosition};
+pub(crate) use airplane::DoneOrders;
 pub use airplane::{AirplaneStart, KnownAircraft};
 pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
 pub use chart::Chart;
@@ -37,6 +43,8 @@ pub use motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
 pub use order::{FlightOrder, FlightTask, MAX_ORDERS};
 pub use pair_plane::PairPlane;
 pub(crate) use pair_plane::RigidMotion;
+pub(crate) use performance::GRAVITY_M_S2;
+pub use performance::{Performance, TurnLimit};
 pub use phase::FlightPhase;
 pub(crate) use segment::{InterOrderSegment, SegmentAfterOrder, segments_after_orders};
 pub use surface::{Frame, Surface, coordinates_from_degrees};

@@ -26,6 +26,8 @@ pub enum FlightTask {
     Heading(f64),
     /// Fly with this airspeed, m/s.
     Speed(f64),
+    /// Fly with this airspeed, m/s, for one cycle on the way to one that was ordered (`acceleration.rs`).
+    Acceleration(f64),
     /// Change to another level.
     Altitude {
         /// Altitude of the new level, in meters.
@@ -37,4 +39,14 @@ pub enum FlightTask {
     Proceed,
     /// Follow these way-points instead.
     WayPoints(Vec<Point>),
+}
+
+impl FlightTask {
+    /// Returns the airspeed in meters per second that it gives, if it gives one.
+    pub(crate) fn speed_m_s(&self) -> Option<f64> {
+        match self {
+            Self::Speed(v_m_s) | Self::Acceleration(v_m_s) => Some(*v_m_s),
+            _ => None,
+        }
+    }
 }

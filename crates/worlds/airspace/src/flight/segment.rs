@@ -16,15 +16,23 @@ pub(crate) struct InterOrderSegment<'a> {
     pub(crate) mission: &'a [Point],
     /// Altitude in meters of the level that it keeps or changes to.
     pub(crate) altitude_m: f64,
-    /// Rate of that change, in meters per second.
+    /// Rate of that change upward, in meters per second.
     pub(crate) climb_m_s: f64,
+    /// Rate of that change downward, in meters per second.
+    pub(crate) descent_m_s: f64,
 }
 
 impl InterOrderSegment<'_> {
     /// Returns the altitude in meters that it has some seconds after `altitude_m`, if nothing holds it.
     pub(crate) fn altitude_after_m(&self, altitude_m: f64, seconds: f64) -> f64 {
         let max_climb_m = self.climb_m_s * seconds;
-        altitude_m + (self.altitude_m - altitude_m).clamp(-max_climb_m, max_climb_m)
+        let max_descent_m = self.descent_m_s * seconds;
+        altitude_m + (self.altitude_m - altitude_m).clamp(-max_descent_m, max_climb_m)
+    }
+
+    /// Returns the rate in meters per second at which it changes its level from an altitude in meters.
+    pub(crate) fn vertical_m_s(&self, altitude_m: f64) -> f64 {
+        if self.altitude_m > altitude_m { self.climb_m_s } else { self.descent_m_s }
     }
 
     /// Returns the levels that it is on in some seconds after `altitude_m`, if nothing holds it.
@@ -40,14 +48,21 @@ pub(crate) struct SegmentAfterOrder {
     mission: Arc<[Point]>,
     altitude_m: f64,
     climb_m_s: f64,
+    descent_m_s: f64,
     /// Number of way-points done with when it starts, if not as many as before.
     pub(crate) next: Option<u32>,
 }
 
 impl SegmentAfterOrder {
     pub(crate) fn segment(&self) -> InterOrderSegment<'_> {
-        let Self { model, mission, altitude_m, climb_m_s, .. } = self;
-        InterOrderSegment { model, mission, altitude_m: *altitude_m, climb_m_s: *climb_m_s }
+        let Self { model, mission, altitude_m, climb_m_s, descent_m_s, .. } = self;
+        InterOrderSegment {
+            model,
+            mission,
+            altitude_m: *altitude_m,
+            climb_m_s: *climb_m_s,
+            descent_m_s: *descent_m_s,
+        }
     }
 }
 
@@ -61,6 +76,7 @@ pub(crate) fn segments_after_orders(airplane: &AirplaneStart) -> Vec<SegmentAfte
         mission: Arc::clone(&route),
         altitude_m: airplane.altitude_m,
         climb_m_s: 0.0,
+        descent_m_s: 0.0,
         next: None,
     };
     let mut all = Vec::with_capacity(airplane.orders.len());
@@ -75,10 +91,15 @@ pub(crate) fn segments_after_orders(airplane: &AirplaneStart) -> Vec<SegmentAfte
                     .or_insert_with(|| route_along_heading(*heading_rad, route.len()));
                 segment.mission = Arc::clone(straight);
             }
-            FlightTask::Speed(v_m_s) => segment.model.v_m_s = *v_m_s,
+            FlightTask::Speed(v_m_s) | FlightTask::Acceleration(v_m_s) => {
+                segment.model.v_m_s = *v_m_s;
+                segment.model.omega_max_rad_s = airplane.performance.turn.omega_rad_s(*v_m_s);
+            }
             FlightTask::Altitude { altitude_m, climb_m_s } => {
                 segment.altitude_m = *altitude_m;
-                segment.climb_m_s = *climb_m_s;
+                // An order may find it above the level that it is to climb to, if others held it on its way.
+                segment.climb_m_s = climb_m_s.min(airplane.performance.climb_max_m_s);
+                segment.descent_m_s = climb_m_s.min(airplane.performance.descent_max_m_s);
             }
             FlightTask::Proceed => segment.mission = Arc::clone(&route),
             FlightTask::WayPoints(way_points) => {

@@ -69,6 +69,7 @@ pub(super) fn filed_flight(world: &AirspaceWorld, id: EntityId) -> FiledFlight {
         model: world.airplanes[id as usize].model.clone(),
         actions: world.actions(id).to_vec(),
         contact: state_from_flight_plan(world, id),
+        turn: world.airplanes[id as usize].performance.turn,
         max_speed_m_s: world.top_m_s[id as usize],
         max_way_points,
         orders,
@@ -146,6 +147,7 @@ pub(super) fn shield_exchange_setup(
             is_fallback_known: one.orbit.is_some() || one.tracked.is_some(),
             common,
             takes_part,
+            turn: world.airplanes[one.id as usize].performance.turn,
             max_speed_m_s: world.top_m_s[one.id as usize],
             // A profile that was found by other means comes before those of its actions.
             max_profiles: world.actions(one.id).len() + 1,

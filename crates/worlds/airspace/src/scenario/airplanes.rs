@@ -1,10 +1,17 @@
 //! Airplanes: their model, generated traffic, flight plans and recorded tracks.
 
 use super::compile::Compiler;
-use crate::flight::{AircraftModel, AirplaneStart, Pose2, Surface, TimeDiscretization, Track};
+use super::performance::performance_from_keys;
+use crate::flight::{
+    AircraftModel, AirplaneStart, Performance, Pose2, SpeedChanges, Surface, TimeDiscretization,
+    Track,
+};
 use crate::flight_plan::{AirplaneSection, mixed_positions};
 use crate::generate::{GeneratorKind, GeneratorParams, generate};
-use crate::settings::{SeparationM, Speed, TurnCount, TurnRate};
+use crate::settings::{
+    AbilityKeys, AltitudeLimit, Bank, PositiveRate, SeparationM, Speed, SpeedLimit, TurnCount,
+    TurnRate, ability_keys,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_import::traffic::MAX_SPEED_M_S;
@@ -39,35 +46,67 @@ pub(super) struct GeneratorSection {
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ModelSection {
+    /// Its type: one of the table of types_file, of OpenAP, or of the built-in ones.
+    #[serde(rename = "type")]
+    pub(super) type_name: Option<Spanned<String>>,
     /// Speed.
     v_m_s: Option<Number<Speed>>,
     /// Greatest turn rate.
     omega_max_deg_s: Option<Number<TurnRate>>,
+    /// Greatest bank in turns: at any speed, turns pull no more to the side than at that bank.
+    pub(super) bank_max_deg: Option<Number<Bank>>,
+    /// Smallest airspeed: it stalls below.
+    pub(super) v_min_m_s: Option<SpeedLimit>,
+    /// Greatest airspeed.
+    pub(super) v_max_m_s: Option<SpeedLimit>,
+    /// Greatest rate of climb.
+    pub(super) climb_max_m_s: Option<PositiveRate>,
+    /// Greatest rate of descent, positive.
+    pub(super) descent_max_m_s: Option<PositiveRate>,
+    /// Lowest altitude.
+    pub(super) floor_m: Option<AltitudeLimit>,
+    /// Highest altitude.
+    pub(super) ceiling_m: Option<AltitudeLimit>,
+    /// Greatest change of airspeed; without it speeds change at once.
+    pub(super) acceleration_m_s2: Option<PositiveRate>,
     /// Distance that all keep from each other.
     separation_m: Option<SeparationM>,
     turns: Option<TurnCount>,
 }
 
 impl ModelSection {
-    /// Returns the values of one airplane, completed with those for all.
-    fn with_airplane_overrides(&self, own: &AirplaneSection) -> Self {
-        Self {
-            v_m_s: own.v_m_s.or(self.v_m_s),
-            omega_max_deg_s: own.omega_max_deg_s.or(self.omega_max_deg_s),
-            separation_m: own.separation_m.or(self.separation_m),
-            turns: own.turns.or(self.turns),
+    /// Returns the abilities that its own keys give.
+    pub(super) fn abilities(&self) -> AbilityKeys {
+        ability_keys!(self)
+    }
+}
+
+/// The abilities of one airplane, and its separation.
+#[derive(Debug, Clone)]
+struct Abilities {
+    keys: AbilityKeys,
+    type_name: Option<String>,
+    separation_m: f64,
+    turns: usize,
+}
+
+impl Abilities {
+    fn performance(&self) -> Performance {
+        performance_from_keys(&self.keys, self.type_name.clone(), PAPER_MODEL.omega_max_rad_s)
+    }
+
+    /// Returns the model of an airplane with some performance and speed.
+    fn model(&self, performance: &Performance, v_m_s: f64) -> AircraftModel {
+        AircraftModel {
+            v_m_s,
+            omega_max_rad_s: performance.turn.omega_rad_s(v_m_s),
+            separation_m: self.separation_m,
+            turns: self.turns,
         }
     }
 
-    fn model(&self) -> AircraftModel {
-        AircraftModel {
-            v_m_s: self.v_m_s.map_or(PAPER_MODEL.v_m_s, f64::from),
-            omega_max_rad_s: self
-                .omega_max_deg_s
-                .map_or(PAPER_MODEL.omega_max_rad_s, |given| given.get().to_radians()),
-            separation_m: self.separation_m.map_or(PAPER_MODEL.separation_m, f64::from),
-            turns: self.turns.map_or(PAPER_MODEL.turns, |turns| turns.0),
-        }
+    fn v_m_s(&self) -> f64 {
+        self.keys.v_m_s.unwrap_or(PAPER_MODEL.v_m_s)
     }
 }
 
@@ -81,24 +120,51 @@ pub(super) struct ReplayPeriod {
 }
 
 impl Compiler<'_> {
+    /// Returns the abilities of an airplane of the file, or of the generated ones: by its own keys, then its own type,
+    /// then the keys and the type of all. Of two types only one counts: a mixture of both is none that flies.
+    fn abilities(&self, own: Option<&Spanned<AirplaneSection>>) -> Abilities {
+        let usual = ModelSection::default();
+        let common = self.file.airplane.as_ref().unwrap_or(&usual);
+        let own = own.map(Spanned::get_ref);
+        let own_type = own.and_then(|own| own.type_name.as_ref());
+        let types = &self.recipe.types;
+        let mut keys = own.map(AirplaneSection::abilities).unwrap_or_default();
+        if let Some(name) = own_type {
+            keys = keys.or(types.abilities(name.get_ref()));
+        }
+        keys = keys.or(common.abilities());
+        let common_type = common.type_name.as_ref();
+        if let Some(name) = common_type.filter(|_| own_type.is_none()) {
+            keys = keys.or(types.abilities(name.get_ref()));
+        }
+        let separation_m = own.and_then(|own| own.separation_m).or(common.separation_m);
+        let turns = own.and_then(|own| own.turns).or(common.turns);
+        Abilities {
+            keys,
+            type_name: own_type.or(common_type).map(|name| name.get_ref().clone()),
+            separation_m: separation_m.map_or(PAPER_MODEL.separation_m, f64::from),
+            turns: turns.map_or(PAPER_MODEL.turns, |turns| turns.0),
+        }
+    }
+
     pub(super) fn airplanes(
         &self,
         streams: &Streams,
         replay: ReplayPeriod,
     ) -> Result<Vec<AirplaneStart>, InputError> {
-        let common = self.file.airplane.clone().unwrap_or_default();
         self.check_generator_surface()?;
         let mut all = match &self.file.airspace.generator {
-            Some(generator) => self.generate_airplanes(generator, &common.model(), streams)?,
+            Some(generator) => self.generate_airplanes(generator, streams)?,
             None => Vec::new(),
         };
         let mut named: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for section in &self.file.airplanes.0 {
-            let own = common.with_airplane_overrides(section.get_ref());
+            let own = self.abilities(Some(section));
             let airplane = match section.get_ref().track(self.source)? {
-                Some(track) => self.recorded_airplane(section, own.model(), track, replay)?,
-                None => self.planned_airplane(section, own.model())?,
+                Some(track) => self.recorded_airplane(section, &own, track, replay)?,
+                None => self.planned_airplane(section, &own, replay.dt_s)?,
             };
+            self.check_performance(&airplane, Some(section))?;
             if let Some(callsign) = &airplane.callsign {
                 let namesakes = named.entry(callsign.clone()).or_default();
                 if namesakes.iter().any(|other| are_confusable(&all[*other], &airplane)) {
@@ -153,10 +219,12 @@ impl Compiler<'_> {
     fn generate_airplanes(
         &self,
         section: &Spanned<GeneratorSection>,
-        model: &AircraftModel,
         streams: &Streams,
     ) -> Result<Vec<AirplaneStart>, InputError> {
         let s = section.get_ref();
+        let abilities = self.abilities(None);
+        let performance = abilities.performance();
+        let model = &abilities.model(&performance, abilities.v_m_s());
         if s.kind == GeneratorKind::Random && s.jitter_m.is_some() {
             let because = "for kind = \"random\", whose places are all drawn";
             return Err(self.source.unused_key("airspace.generator.jitter_m", because));
@@ -170,11 +238,18 @@ impl Compiler<'_> {
         let radius_m = s.radius_m.map_or(default_radius_m, f64::from);
         let jitter_m = s.jitter_m.map_or(DEFAULT_JITTER_M, f64::from);
         let errors_m = self.error_margin_m(model);
-        let params = GeneratorParams { kind: s.kind, n, radius_m, jitter_m, model, errors_m };
-        generate(&params, streams).map_err(|placed| {
+        let performance = &performance;
+        let params =
+            GeneratorParams { kind: s.kind, n, radius_m, jitter_m, model, performance, errors_m };
+        let generated = generate(&params, streams).map_err(|placed| {
             let cause = format!("no place is left after {placed} of {n} airplanes");
             self.source.error(section.span(), cause, "give a larger radius_m or a smaller n")
-        })
+        })?;
+        // All have the same abilities.
+        if let Some(first) = generated.first() {
+            self.check_performance(first, None)?;
+        }
+        Ok(generated)
     }
 
     /// Returns how much farther from each other two airplanes of a model have to start, because of errors: they are
@@ -192,7 +267,8 @@ impl Compiler<'_> {
     fn planned_airplane(
         &self,
         section: &Spanned<AirplaneSection>,
-        model: AircraftModel,
+        abilities: &Abilities,
+        dt_s: f64,
     ) -> Result<AirplaneStart, InputError> {
         let s = section.get_ref();
         let error =
@@ -210,14 +286,32 @@ impl Compiler<'_> {
             return error("an airplane without way-points", remedy);
         }
         let heading_rad = sidestep_kernel::math::wrap_angle(heading_deg.get().to_radians());
-        let (orders, leaves_s) = s.orders(self.source)?;
+        let performance = abilities.performance();
+        let model = abilities.model(&performance, abilities.v_m_s());
+        let altitude_m = s.altitude_m.map_or(0.0, f64::from);
+        let appears_s = s.appears_s.map_or(0.0, f64::from);
+        let (mut orders, leaves_s) = s.orders(self.source, &performance, altitude_m)?;
+        if performance.accelerates() {
+            let changes = SpeedChanges {
+                v_m_s: model.v_m_s,
+                acceleration_m_s2: performance.acceleration_m_s2,
+                first_cycle: (appears_s / dt_s).ceil() as u64,
+                dt_s,
+            };
+            let Some(steps) = changes.steps(&orders) else {
+                let cause = "orders to speeds that take more than 60000 cycles to reach";
+                return error(cause, "give a larger acceleration_m_s2, or a longer dt_s");
+            };
+            orders = steps;
+        }
         Ok(AirplaneStart {
             callsign: s.callsign(self.source)?,
             model,
+            performance,
             start: Pose2 { at, heading_rad },
             mission,
-            altitude_m: s.altitude_m.map_or(0.0, f64::from),
-            appears_s: s.appears_s.map_or(0.0, f64::from),
+            altitude_m,
+            appears_s,
             leaves_s,
             orders,
             track: None,
@@ -231,7 +325,7 @@ impl Compiler<'_> {
     fn recorded_airplane(
         &self,
         section: &Spanned<AirplaneSection>,
-        mut model: AircraftModel,
+        abilities: &Abilities,
         track: Track,
         replay: ReplayPeriod,
     ) -> Result<AirplaneStart, InputError> {
@@ -243,13 +337,16 @@ impl Compiler<'_> {
             );
             return Err(self.source.error(section.span(), cause, remedy));
         }
-        if section.get_ref().v_m_s.is_none() {
+        let performance = abilities.performance();
+        let v_m_s = match section.get_ref().v_m_s {
+            Some(v_m_s) => v_m_s.get(),
             // One that hardly moves in its record must be able to fly as well.
-            model.v_m_s = track.mean_speed_m_s(replay.until_s).max(1.0);
-        }
+            None => track.mean_speed_m_s(replay.until_s).max(1.0),
+        };
+        let model = abilities.model(&performance, v_m_s);
         let callsign = section.get_ref().callsign(self.source)?;
         let is_non_cooperative = section.get_ref().is_non_cooperative(self.source)?;
-        let airplane = replayed_airplane(track, model, replay, is_non_cooperative);
+        let airplane = replayed_airplane(track, (model, performance), replay, is_non_cooperative);
         let priority = section.get_ref().priority.map_or(0, |priority| priority.get() as u8);
         Ok(AirplaneStart { callsign, priority, ..airplane })
     }
@@ -273,7 +370,7 @@ fn are_confusable(one: &AirplaneStart, other: &AirplaneStart) -> bool {
 
 fn replayed_airplane(
     track: Track,
-    model: AircraftModel,
+    (model, performance): (AircraftModel, Performance),
     replay: ReplayPeriod,
     is_non_cooperative: bool,
 ) -> AirplaneStart {
@@ -289,6 +386,7 @@ fn replayed_airplane(
     AirplaneStart {
         callsign: None,
         model,
+        performance,
         start: track.pose_at(appears_s),
         mission: track.remaining_way_points(joins_s),
         altitude_m: track.altitude_at_m(joins_s),

@@ -2,7 +2,7 @@
 
 use super::start_groups::largest_start_group;
 use super::{AirspaceFile, CompiledAirspace, ParsedScenario, Preset};
-use crate::flight::{AirplaneStart, FlightTask};
+use crate::flight::AirplaneStart;
 use crate::flight::{FlightLevelRange, MAX_STEPS_PER_DT};
 use crate::flight::{TimeDiscretization, WaypointRule};
 use crate::method::{MethodKind, OwnMethod};
@@ -11,7 +11,6 @@ use crate::settings::{BuiltInMethod, Deployment, Disturbance, Grouping, Reactive
 use crate::shield::{ErrorBounds, ExemptIds, Fallback, ShieldedAircraft, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{ByName, SeedEffect, Source, Spanned};
@@ -44,7 +43,7 @@ const DEFAULT_SIGMAS: f64 = 5.0;
 const GIB: f64 = (1_u64 << 30) as f64;
 
 pub(super) struct Compiler<'a> {
-    recipe: &'a Arc<ParsedScenario>,
+    pub(super) recipe: &'a Arc<ParsedScenario>,
     pub(super) source: &'a Source,
     pub(super) file: &'a AirspaceFile,
     seed: u64,
@@ -155,7 +154,7 @@ impl<'a> Compiler<'a> {
             replay_cycles: replay.cycles,
             disturbance: self.disturbance(),
             bounds: self.error_bounds(),
-            fingerprint: fingerprint(&self.recipe.source.text, self.seed),
+            fingerprint: self.recipe.fingerprint(self.seed),
             streams,
             actions: Arc::default(),
             later: Arc::default(),
@@ -227,7 +226,8 @@ impl<'a> Compiler<'a> {
             return error(cause, remedy);
         }
         let weak = world.airplanes.iter().find(|a| {
-            let rate_rad_s = world.bounds.max_orbit_rate_rad_s(&a.model, world.timing.dt_s);
+            let rate_rad_s =
+                world.bounds.max_orbit_rate_rad_s(&a.least_turning_model(), world.timing.dt_s);
             !a.is_non_cooperative && rate_rad_s.is_none()
         });
         let Some(weak) = weak else { return Ok(()) };
@@ -235,7 +235,7 @@ impl<'a> Compiler<'a> {
             "gusts turn airplanes by up to {:.2} deg per dt_s (error_sigmas times \
              heading_noise_deg), and one of {:.2} deg/s cannot hold an orbit against them",
             gust_rad.to_degrees(),
-            weak.model.omega_max_rad_s.to_degrees()
+            weak.least_turning_model().omega_max_rad_s.to_degrees()
         );
         let remedy = "give a smaller heading_noise_deg or error_sigmas, or set shield = \"off\"";
         error(&cause, remedy)
@@ -256,8 +256,10 @@ impl<'a> Compiler<'a> {
         span: Option<std::ops::Range<usize>>,
         airplanes: &[AirplaneStart],
     ) -> Result<(), InputError> {
-        let min_speed_m_s =
-            airplanes.iter().flat_map(planned_speeds_m_s).fold(f64::INFINITY, f64::min);
+        let min_speed_m_s = airplanes
+            .iter()
+            .flat_map(AirplaneStart::planned_speeds_m_s)
+            .fold(f64::INFINITY, f64::min);
         let wind_speed_m_s = sidestep_kernel::math::hypot(wind_m_s[0], wind_m_s[1]);
         if wind_speed_m_s < min_speed_m_s {
             return Ok(());
@@ -464,13 +466,4 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Fallback>, Vec<(u32, u32)>)
         fallbacks[i] = fallback;
     }
     (fallbacks, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
-}
-
-/// Returns the speed of an airplane's model and those of its orders.
-fn planned_speeds_m_s(airplane: &AirplaneStart) -> impl Iterator<Item = f64> {
-    let ordered = airplane.orders.iter().filter_map(|order| match order.task {
-        FlightTask::Speed(v_m_s) => Some(v_m_s),
-        _ => None,
-    });
-    ordered.chain([airplane.model.v_m_s])
 }

@@ -2,7 +2,8 @@
 //!
 //! They are no errors, because sweeps and `compare` fly one scenario by several methods.
 
-use super::{AirspaceSection, CompiledAirspace};
+use super::{AirspaceSection, CompiledAirspace, ModelSection};
+use crate::flight::{FlightTask, TurnLimit};
 use crate::method::MethodKind;
 use sidestep_scenario::Remark;
 
@@ -45,7 +46,49 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     if section.error_sigmas.is_some() && has_no_errors(section) {
         note("error_sigmas", "position_noise_m and heading_noise_deg are 0");
     }
+    if compiled.recipe.types.is_empty() {
+        let files = [
+            ("types_file", section.types_file.is_some()),
+            ("openap_folder", section.openap_folder.is_some()),
+        ];
+        for (key, _) in files.into_iter().filter(|(_, is_given)| *is_given) {
+            note(key, "no airplane has a type");
+        }
+    }
+    remarks.extend(effectless_limits(compiled));
     remarks
+}
+
+/// Returns the remarks on limits for all airplanes that no airplane comes near.
+fn effectless_limits(compiled: &CompiledAirspace) -> Vec<Remark> {
+    let airplanes = &compiled.world.airplanes;
+    let keys = compiled.recipe.file.airplane.as_ref().map(ModelSection::abilities);
+    let keys = keys.unwrap_or_default();
+    let orders = || airplanes.iter().flat_map(|airplane| &airplane.orders);
+    let changes_speed = orders().any(|order| order.task.speed_m_s().is_some());
+    let changes_level = orders().any(|order| matches!(order.task, FlightTask::Altitude { .. }));
+    let bank_holds = airplanes.iter().all(|airplane| {
+        let TurnLimit { omega_max_rad_s, lateral_m_s2 } = airplane.performance.turn;
+        airplane.planned_speeds_m_s().all(|v_m_s| lateral_m_s2 / v_m_s < omega_max_rad_s)
+    });
+    let no_speed = "no airplane is ordered to another speed";
+    let no_level = "no airplane is ordered to another level";
+    let all = [
+        (
+            "omega_max_deg_s",
+            keys.omega_max_deg_s.is_some() && bank_holds,
+            "the bank limits all turns more",
+        ),
+        ("acceleration_m_s2", keys.acceleration_m_s2.is_some() && !changes_speed, no_speed),
+        ("climb_max_m_s", keys.climb_max_m_s.is_some() && !changes_level, no_level),
+        ("descent_max_m_s", keys.descent_max_m_s.is_some() && !changes_level, no_level),
+    ];
+    let effectless = all.into_iter().filter(|(_, has_no_effect, _)| *has_no_effect);
+    effectless
+        .map(|(key, _, because)| {
+            Remark::note(format!("airplane.{key}"), format!("has no effect: {because}"))
+        })
+        .collect()
 }
 
 /// Returns the keys of the optimizer that are given. The actions, which `holds_s` and `legs` give, are none of them: those
@@ -151,6 +194,29 @@ mod tests {
     fn settings_of_a_method_that_comes_later_have_an_effect() {
         let changes = "changes = [{ at_s = 50.0, method = \"mvp\" }]\nmvp = { margin = 1.3 }\n";
         assert_eq!(remarks(&format!("method = \"none\"\n{changes}")), [""; 0]);
+    }
+
+    #[test]
+    fn limits_that_no_airplane_comes_near_are_named() {
+        let named = |airplane: &str, orders: &str| -> Vec<String> {
+            let text = format!(
+                "format = 1\nworld = \"airspace\"\n[airplane]\n{airplane}\n[[airplanes]]\nat_m = [0, 0]\n\
+                 heading_deg = 0\nway_points_m = [[9000, 0]]\n{orders}\n"
+            );
+            let compiled = CompiledAirspace::new(&Source::new("l", text, "")).expect("a scenario");
+            effectless_remarks(&compiled).into_iter().map(|remark| remark.key).collect()
+        };
+        let limits = "acceleration_m_s2 = 1.0\nclimb_max_m_s = 9.0\ndescent_max_m_s = 9.0\n\
+                      bank_max_deg = 5.0\nomega_max_deg_s = 4.0";
+        let all = ["omega_max_deg_s", "acceleration_m_s2", "climb_max_m_s", "descent_max_m_s"];
+        assert_eq!(named(limits, ""), all.map(|key| format!("airplane.{key}")));
+        let orders = "orders = [{ speed_m_s = 9.0 }, { altitude_m = 9.0 }]";
+        assert_eq!(named(limits, orders), [""; 0], "the turn rate limits it when it is slow");
+    }
+
+    #[test]
+    fn tables_of_types_that_no_airplane_names_are_named() {
+        assert_eq!(remarks("openap_folder = \"data\"\n"), ["airspace.openap_folder"]);
     }
 
     #[test]

@@ -135,10 +135,11 @@ impl Compiler<'_> {
             return error(cause, remedy);
         }
         // The stored orbits of others depend on speed and level.
-        let orders_change_safety = airplanes
-            .iter()
-            .flat_map(|airplane| &airplane.orders)
-            .any(|order| matches!(order.task, FlightTask::Speed(_) | FlightTask::Altitude { .. }));
+        let orders_change_safety =
+            airplanes.iter().flat_map(|airplane| &airplane.orders).any(|order| {
+                order.task.speed_m_s().is_some()
+                    || matches!(order.task, FlightTask::Altitude { .. })
+            });
         if self.file.airspace.shield.0 && orders_change_safety {
             let cause = "orders of speed or level, over a network that is not to be relied on";
             let remedy = "nobody could be sure who knows of them: leave them out, or \

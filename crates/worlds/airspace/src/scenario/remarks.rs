@@ -2,10 +2,9 @@
 
 use super::CompiledAirspace;
 use super::effectless::effectless_remarks;
+use crate::flight::GRAVITY_M_S2;
 use sidestep_scenario::Remark;
 
-/// Acceleration of gravity in meters per second squared.
-const GRAVITY_M_S2: f64 = 9.80665;
 /// Largest acceleration to the side of a turn without a warning, in gravities: 80 degrees of bank. Aerobatic and combat
 /// aircraft pull more for seconds, and not in every turn.
 const MAX_TURN_GRAVITIES: f64 = 5.67;
@@ -16,26 +15,51 @@ const USUAL_BANK_TANGENT: f64 = 0.577_350_269_189_625_8;
 /// Returns the remarks on a scenario, warnings first.
 pub(crate) fn scenario_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     let mut remarks: Vec<Remark> = turn_remark(compiled).into_iter().collect();
+    remarks.extend(missing_type_remarks(compiled));
     remarks.extend(effectless_remarks(compiled));
     remarks
 }
 
+/// Returns notes on the limits that types of another program's tables leave out, so that nothing limits them.
+fn missing_type_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
+    let missing = compiled.recipe.types.missing.iter().filter(|(_, keys)| !keys.is_empty());
+    let note = |(name, keys): (&String, &Vec<String>)| {
+        let words = format!(
+            "OpenAP gives no {} of type {name}: what [airplane] or the airplane gives counts, or else nothing limits it",
+            keys.join(", ")
+        );
+        Remark::note("airspace.openap_folder", words)
+    };
+    missing.map(note).collect()
+}
+
+/// The fastest turn of an airplane at one of its speeds.
+struct FastTurn {
+    /// Acceleration to the side, in gravities.
+    gravities: f64,
+    v_m_s: f64,
+    omega_rad_s: f64,
+}
+
 /// Returns a warning of the hardest turn, if hardly any aircraft could fly it.
 fn turn_remark(compiled: &CompiledAirspace) -> Option<Remark> {
-    let turns = compiled.world.airplanes.iter().map(|airplane| {
-        let model = &airplane.model;
-        (model.v_m_s * model.omega_max_rad_s / GRAVITY_M_S2, model)
+    let turns = compiled.world.airplanes.iter().flat_map(|airplane| {
+        airplane.planned_speeds_m_s().map(|v_m_s| {
+            let omega_rad_s = airplane.performance.turn.omega_rad_s(v_m_s);
+            FastTurn { gravities: v_m_s * omega_rad_s / GRAVITY_M_S2, v_m_s, omega_rad_s }
+        })
     });
-    let (gravities, model) = turns.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+    let FastTurn { gravities, v_m_s, omega_rad_s } =
+        turns.max_by(|a, b| a.gravities.total_cmp(&b.gravities))?;
     if gravities <= MAX_TURN_GRAVITIES {
         return None;
     }
-    let usual_deg_s = (GRAVITY_M_S2 * USUAL_BANK_TANGENT / model.v_m_s).to_degrees();
+    let usual_deg_s = (GRAVITY_M_S2 * USUAL_BANK_TANGENT / v_m_s).to_degrees();
     let words = format!(
         "turns of {} deg/s at {} m/s need {gravities:.0} times the acceleration of gravity, which hardly any aircraft flies: \
          at 30 degrees of bank it turns by {usual_deg_s:.2} deg/s",
-        round_to_hundredths(model.omega_max_rad_s.to_degrees()),
-        round_to_hundredths(model.v_m_s),
+        round_to_hundredths(omega_rad_s.to_degrees()),
+        round_to_hundredths(v_m_s),
     );
     Some(Remark::warning("airplane.omega_max_deg_s", words))
 }

@@ -34,6 +34,7 @@ macro_rules! bounds {
 bounds! {
     Speed, 1e-3, MAX_SPEED_M_S, "0.001 to 1e6 m/s", "slower steps are lost in rounding, and nothing is faster";
     TurnRate, 1e-3, 360.0, "0.001 to 360 degrees per second", "slower turns make orbits without end";
+    Bank, 1.0, 85.0, "1 to 85 degrees of bank", "flatter turns take forever, and steeper ones pull eleven times gravity";
     Decision, 0.01, 3600.0, "0.01 to 3600 s", "one decision per hour is too slow for collision avoidance";
     Step, 0.001, 3600.0, "0.001 to 3600 s", "a step is part of dt_s, and a run has many";
     LookAhead, 0.001, 86_400.0, "0.001 to 86400 s", "predictions are limited to one day";

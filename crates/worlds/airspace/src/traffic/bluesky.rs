@@ -11,6 +11,7 @@ use super::flyable_aircraft::{
 use super::import_settings::{
     ImportedChange, ImportedRules, ImportedScenarioSettings, import_settings,
 };
+use super::imported_types::{ClipCounts, ClippedFlight, ImportedTypes, TypedFlight};
 use super::position::{origin_text, path_of_heading, position_text, positions_text};
 use super::scn_flight::FlightCommand;
 use super::{
@@ -26,21 +27,38 @@ use std::fmt::Write;
 
 /// Returns the scenario of a BlueSky file; `None` when none of its aircraft has a position and a speed.
 pub fn from_bluesky(name: &str, file: &ScnFile) -> Option<String> {
+    Some(from_bluesky_with_types(name, file, &ImportedTypes::default())?.text)
+}
+
+/// A BlueSky file as a scenario.
+pub(crate) struct BlueskyScenario {
+    pub(crate) text: String,
+    /// Commands beyond what a type can fly.
+    pub(crate) clipped: ClipCounts,
+}
+
+/// Returns the scenario of a BlueSky file, with types of aircraft.
+pub(crate) fn from_bluesky_with_types(
+    name: &str,
+    file: &ScnFile,
+    types: &ImportedTypes,
+) -> Option<BlueskyScenario> {
     let settings = &settings_from_bluesky(name, file);
     let aircraft: Vec<FlyableScnAircraft> =
         file.traffic.aircraft.iter().filter_map(aircraft_at_flying_speed).collect();
     let origin = origin_text(aircraft.iter().map(|one| one.0.position()))?;
     let start = &settings.start;
     let zone = SeparationMinima { gap_m: start.separation_m, vertical_m: start.vertical_m };
-    let more = settings_text(settings) + &origin;
+    let more = settings_text(settings) + &types.folder_text() + &origin;
     // A prediction reaches as far as one decision at least.
     let horizon_s = start.look_ahead_s.map(|s| s.max(DT_S));
     let mut text = header_text(name, zone, horizon_s, &more);
-    let context = FlightContext { ends_s: file.traffic.ends_s, winds: &settings.winds };
+    let context = FlightContext { ends_s: file.traffic.ends_s, winds: &settings.winds, types };
+    let mut clipped = ClipCounts::default();
     for one in &aircraft {
-        write_aircraft(&mut text, &one.0, context);
+        clipped.add(write_aircraft(&mut text, &one.0, context));
     }
-    Some(text)
+    Some(BlueskyScenario { text, clipped })
 }
 
 /// Returns the rules of a BlueSky file, which is `place` in errors, and all aircraft that cannot
@@ -118,18 +136,31 @@ struct FlightContext<'a> {
     ends_s: Option<f64>,
     /// The winds, each from its time on.
     winds: &'a [(f64, [f64; 2])],
+    types: &'a ImportedTypes,
 }
 
-/// Writes an aircraft.
-fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, context: FlightContext<'_>) {
+/// Writes an aircraft, and returns how often its commands were beyond what its type can fly.
+fn write_aircraft(
+    text: &mut String,
+    aircraft: &ScnAircraft,
+    context: FlightContext<'_>,
+) -> ClipCounts {
     let at_deg = position_text(aircraft.position());
     let heading_deg = 90.0 - aircraft.heading_deg;
-    let v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft);
+    let mut v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft);
+    let mut altitude_m = aircraft.altitude_ft * FOOT_M;
     let mut way_points: Vec<LatLon> = aircraft.known_goals().collect();
     let mut orders = flight_commands(aircraft, !way_points.is_empty(), context.winds);
     if let Some(ends_s) = context.ends_s {
         orders.retain(|(at_s, _)| *at_s < ends_s);
         orders.push((ends_s, FlightCommand::Leave));
+    }
+    let flight = TypedFlight { v_m_s, altitude_m, orders: orders.clone() };
+    let typed = context.types.clipped(&aircraft.kind, flight);
+    let mut counts = ClipCounts::default();
+    if let Some(clipped) = &typed {
+        TypedFlight { v_m_s, altitude_m, orders } = clipped.flight.clone();
+        counts = clipped.counts;
     }
     if way_points.is_empty() {
         way_points =
@@ -145,25 +176,30 @@ fn write_aircraft(text: &mut String, aircraft: &ScnAircraft, context: FlightCont
         _ => None,
     });
     let omega_deg_s = banked_turn_deg_s(ordered_m_s.fold(v_m_s, f64::max));
-    let altitude_m = aircraft.altitude_ft * FOOT_M;
     let appears_s = aircraft.created_s;
     // Writing to a string cannot fail.
     let _ = write!(
         text,
         "\n[[airplanes]]\n{}at_deg = [{at_deg}]\nheading_deg = {heading_deg:?}\n\
          way_points_deg = {way_points_deg}\naltitude_m = {altitude_m:?}\n\
-         appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\nomega_max_deg_s = {omega_deg_s:?}\n",
+         appears_s = {appears_s:?}\nv_m_s = {v_m_s:?}\n",
         callsign(&aircraft.id)
     );
+    if typed.is_some() {
+        ClippedFlight::write_type(text, &aircraft.kind);
+    } else {
+        let _ = writeln!(text, "omega_max_deg_s = {omega_deg_s:?}");
+    }
     write_own_settings(text, aircraft);
     if orders.is_empty() {
-        return;
+        return counts;
     }
     text.push_str("orders = [\n");
     for (at_s, command) in orders {
         let _ = writeln!(text, "  {{ at_s = {at_s:?}, {} }},", command.text());
     }
     text.push_str("]\n");
+    counts
 }
 
 /// Returns whether an aircraft has its first way-point behind it where it is created, and beside the leg that leads on:

@@ -2,7 +2,7 @@
 
 use super::Proposal;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::{FlightConditions, FlightLevelRange};
+use crate::flight::{FlightConditions, FlightLevelRange, TurnLimit};
 use crate::shield::{CommonPlan, PlanCertainty, ShieldedAircraft, TurnProfile};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
@@ -30,6 +30,8 @@ pub struct ObservedAircraft {
     pub filed_v_m_s: f64,
     /// The levels from the one where it is seen to the one of its filed flight.
     pub filed_levels: FlightLevelRange,
+    /// The limits on its turn rate.
+    pub turn: TurnLimit,
     /// Its greatest speed in meters per second.
     pub max_speed_m_s: f64,
     /// Largest number of different profiles that it can propose.
@@ -89,16 +91,12 @@ impl ShieldExchangeSetup {
         InvalidMessage::Airplane.ensure(are_known && is_ascending(exempt))?;
         InvalidMessage::Plan.ensure(observed.aircraft.may_store(proposal.fallback))?;
         InvalidMessage::Length.ensure(profiles.len() <= self.aircraft[place].max_profiles)?;
-        profiles.iter().try_for_each(|profile| self.check_profile(place, profile))
+        let max_rad_s = observed.turn.omega_rad_s(proposal.v_m_s(observed));
+        profiles.iter().try_for_each(|profile| self.check_profile(profile, max_rad_s))
     }
 
-    /// Checks a profile that the airplane at a place may fly.
-    pub(super) fn check_profile(
-        &self,
-        place: usize,
-        profile: &TurnProfile,
-    ) -> Result<(), InvalidMessage> {
-        let max_rad_s = self.aircraft[place].aircraft.omega_max_rad_s;
+    /// Checks a profile of an airplane that turns at no more than some radians per second.
+    fn check_profile(&self, profile: &TurnProfile, max_rad_s: f64) -> Result<(), InvalidMessage> {
         InvalidMessage::Length
             .ensure(profile.omegas_rad_s.len() == self.air.timing.points_per_dt())?;
         // Comparisons with NaN are false.
