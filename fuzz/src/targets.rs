@@ -7,7 +7,7 @@ use sidestep::import::table::CsvTable;
 use sidestep::import::urdf::{Model, srdf::Semantics};
 use sidestep::import::{
     ForeignFormat, ascii, bag, bluesky, carmen, image::Bitmap, lorr, mesh, movingai, mrclam,
-    rosmap, stage, traffic,
+    openap, rosmap, stage, traffic,
 };
 use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
@@ -48,6 +48,7 @@ pub(crate) const TARGETS: &[Target] = &[
     }),
     ("translate", |data| drop(WORLDS.import_scenario(&file("f.scn", data), &Default::default()))),
     ("bluesky_call", |data| drop(bluesky::read(&file("f.scn", data)))),
+    ("openap", |data| text(data, openap_type)),
     ("navdata", |data| drop(bluesky::NavigationData::read(navdata_folder(data)))),
     ("carmen", |data| text(data, |t| drop(carmen::parse("f", t, None)))),
     ("learn_carmen", |data| {
@@ -182,6 +183,11 @@ fn learned(text: &str) {
 fn tabled(data: &[u8]) {
     file("f.parquet", data);
     drop(read_table(folder(), "f", ..));
+}
+
+/// Reads a text as both files of a type.
+fn openap_type(text: &str) {
+    drop(openap::parse("f", text, text));
 }
 
 /// Reads a text as a list of starts and as one of tasks.

@@ -1,4 +1,5 @@
-//! Types of airplanes from an installed OpenAP (TU Delft, <https://openap.dev>; LGPL, so we do not ship its data).
+//! Types of airplanes from an installed OpenAP (TU Delft, <https://openap.dev>; its data are under the GPL, so we do not
+//! ship them).
 //!
 //! Of its folder `openap/data`, the files `aircraft/NAME.yml` give speeds and ceiling, and those of its kinematic model
 //! WRAP, `wrap/NAME.txt`, vertical speeds and approaches, from recorded flights (Sun, Ellerbroek and Hoekstra, "WRAP: An
@@ -15,6 +16,8 @@ use std::path::{Path, PathBuf};
 const MAX_BYTES: u64 = 64 << 10;
 /// Longest name of a type; ICAO's designators have four characters.
 const MAX_NAME_BYTES: usize = 8;
+/// Longest line of a file in `aircraft`, in bytes; OpenAP's have up to 100.
+const MAX_LINE_BYTES: usize = 400;
 const FOOT_M: f64 = 0.3048;
 
 /// One type of OpenAP. What its files leave out is `None`.
@@ -56,11 +59,22 @@ pub fn load(folder: &Path, name: &str) -> Result<Option<OpenapType>, InputError>
     if !is_name || !path.is_file() {
         return Ok(None);
     }
-    let mut found = parse_aircraft(&path, &read_text(&path, MAX_BYTES)?)?;
-    if let Some(path) = wrap_file(folder, &name)? {
-        add_kinematics(&mut found, &read_text(&path, MAX_BYTES)?);
-    }
-    Ok(Some(found))
+    let aircraft = read_text(&path, MAX_BYTES)?;
+    let kinematics = match wrap_file(folder, &name)? {
+        Some(path) => read_text(&path, MAX_BYTES)?,
+        None => String::new(),
+    };
+    parse(&path.display().to_string(), &aircraft, &kinematics).map(Some)
+}
+
+/// Returns a type from the text of its file in `aircraft`, which is `place` in errors, and of its file in `wrap`.
+///
+/// # Errors
+/// When the first is not as OpenAP has it.
+pub fn parse(place: &str, aircraft: &str, kinematics: &str) -> Result<OpenapType, InputError> {
+    let mut found = parse_aircraft(place, aircraft)?;
+    add_kinematics(&mut found, kinematics);
+    Ok(found)
 }
 
 /// Returns the names of the types that a folder has, in upper case; none if it cannot be read.
@@ -96,11 +110,16 @@ fn wrap_file(folder: &Path, name: &str) -> Result<Option<PathBuf>, InputError> {
 }
 
 /// Reads the file of a type in `aircraft`.
-fn parse_aircraft(path: &Path, text: &str) -> Result<OpenapType, InputError> {
+fn parse_aircraft(place: &str, text: &str) -> Result<OpenapType, InputError> {
     let error = |cause: String| {
         let remedy = "give a file of OpenAP's folder aircraft as it is installed";
-        InputError::new(path.display().to_string(), cause, remedy)
+        InputError::new(place, cause, remedy)
     };
+    // The parser calls itself for a list within a list: without brackets, the length of a line bounds their depth.
+    let is_deep = |line: &str| line.len() > MAX_LINE_BYTES || line.contains(['[', '{']);
+    if text.lines().any(is_deep) {
+        return Err(error("it has long lines or brackets, which no file of OpenAP has".into()));
+    }
     let documents = Yaml::load_from_str(text).map_err(|e| error(format!("it is no YAML: {e}")))?;
     let document = documents.first().ok_or_else(|| error("it is empty".into()))?;
     let number = |keys: &[&str]| {
@@ -147,4 +166,49 @@ fn add_kinematics(found: &mut OpenapType, text: &str) {
 fn larger(before: Option<f64>, rate_m_s: f64) -> Option<f64> {
     let most_m_s = before.unwrap_or(0.0).max(rate_m_s);
     (most_m_s > 0.0).then_some(most_m_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AIRCRAFT: &str = "vmo: 350\nmmo: 0.82\nceiling: 12500\ncruise:\n  height: 11000\n  mach: 0.78\nwing:\n  t/c: null\n";
+
+    #[test]
+    fn a_type_has_the_limits_of_its_files() {
+        let kinematics = "variable flight phase name opt min max model parameters\n\
+            ic_vs_avg initial_climb Mean vertical rate 12.59 9.15 16.04 norm 12.59|2.09\n\
+            cl_vs_avg_mach_const climb Mean climb rate, constant-Mach 5.28 3.6 6.97 norm 5.29|1.03\n\
+            de_vs_avg_cas_const descent Mean descent rate, constant-CAS -10.03 -14.68 -5.35 norm -10.02|2.84\n\
+            fa_va_avg final_approach Mean airspeed 72 67 77 norm 72.43|3.49\n";
+        let found = parse("a320.yml", AIRCRAFT, kinematics).expect("right");
+        assert_eq!([found.climb_max_m_s, found.descent_max_m_s], [Some(16.04), Some(14.68)]);
+        assert_eq!([found.v_min_m_s, found.ceiling_m], [Some(67.0), Some(12500.0)]);
+        let cruise_ft = 11_000.0 / FOOT_M;
+        let cruise_m_s = Airspeed::Mach(0.78).true_airspeed_mps(cruise_ft);
+        let by_mach_m_s = Airspeed::Mach(0.82).true_airspeed_mps(cruise_ft);
+        assert_eq!([found.cruise_m_s, found.v_max_m_s], [Some(cruise_m_s), Some(by_mach_m_s)]);
+        assert!(Airspeed::CasKt(350.0).true_airspeed_mps(cruise_ft) > by_mach_m_s);
+    }
+
+    #[test]
+    fn what_the_files_leave_out_is_none() {
+        let found = parse("x.yml", "ceiling: 9000\n", "fa_va_avg x 1\nnonsense\n").expect("right");
+        assert_eq!(found, OpenapType { ceiling_m: Some(9000.0), ..OpenapType::default() });
+    }
+
+    #[test]
+    fn a_file_of_another_kind_is_an_error_with_a_remedy() {
+        let nested = "[\n".repeat(30_000);
+        for (text, cause) in [
+            ("", "it is empty"),
+            ("ceiling: low\n", "no `ceiling`"),
+            ("ceiling: -3\n", "no `ceiling`"),
+            ("a: b: c\n", "no YAML"),
+            (nested.as_str(), "brackets"),
+        ] {
+            let error = parse("x.yml", text, "").expect_err(cause).to_string();
+            assert!(error.contains(cause) && error.contains("as it is installed"), "{error}");
+        }
+    }
 }

@@ -20,6 +20,8 @@ pub(crate) const BURST: Purpose = Purpose(6);
 pub(crate) const BURST_LOSS: Purpose = Purpose(7);
 /// Methods of a program's own, one stream per airplane and cycle.
 pub(crate) const METHOD: Purpose = Purpose(8);
+/// Gusts.
+pub(crate) const GUST: Purpose = Purpose(9);
 
 /// Returns the streams and purposes from which a network's faults are drawn.
 pub(crate) fn network_fault_streams(streams: Streams) -> FaultStreams {

@@ -4,6 +4,7 @@ mod airplanes;
 mod compile;
 mod earth;
 mod effectless;
+mod gusts;
 mod network;
 mod optimizer;
 mod performance;
@@ -25,6 +26,7 @@ use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
 use compile::Compiler;
+use gusts::GustsSection;
 use network::NetworkSection;
 use optimizer::{LegsSection, MvpSection, OnOffSwitch, ReactiveSection, TimeList};
 pub(super) use remarks::scenario_remarks;
@@ -122,6 +124,7 @@ struct AirspaceSection {
     replay_until_s: Option<Number<ReplayUntilRange>>,
     group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
+    gusts: Option<Spanned<GustsSection>>,
     /// Latitude and longitude of the origin.
     origin_deg: Option<Spanned<Point<2, Closed<-360, 360>>>>,
     /// Time of the start, in seconds since 1970, UTC.

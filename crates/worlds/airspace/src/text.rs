@@ -11,6 +11,7 @@ use sidestep_kernel::Cycle;
 use sidestep_kernel::text::{
     JsonTextReport, KeyValues, align_pairs, group_thousands, key_value_pair,
 };
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Returns what is known of a scenario before it runs.
@@ -149,8 +150,22 @@ fn abilities_text(world: &AirspaceWorld) -> KeyValues {
         key_value_pair("method", format!("{method}, {deployment}, shield {shield}")),
     ]
     .into_iter()
+    .chain(types_text(world))
     .chain(rule_changes_text(world))
     .collect()
+}
+
+/// Returns the types of the airplanes, with their numbers.
+fn types_text(world: &AirspaceWorld) -> Option<(String, String)> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for airplane in &*world.airplanes {
+        if let Some(name) = &airplane.performance.type_name {
+            *counts.entry(name).or_default() += 1;
+        }
+    }
+    let counts: Vec<(&str, usize)> = counts.into_iter().collect();
+    let names = first_names(&counts, |(name, count)| format!("{count} {name}"))?;
+    Some(key_value_pair("types", names))
 }
 
 /// Returns the first changes of rules, and the number of others.

@@ -6,8 +6,8 @@ mod tests;
 
 use super::flight::{
     Action, AirplaneStart, Chart, DetourAlternatives, DoneOrders, FlightConditions,
-    FlightLevelRange, FlightPhase, InterOrderSegment, KnownAircraft, Point, Pose2, RoutePosition,
-    SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, actions,
+    FlightLevelRange, FlightPhase, Gusts, InterOrderSegment, KnownAircraft, Point, Pose2,
+    RoutePosition, SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, actions,
     actions_at_turn_rate, segments_after_orders,
 };
 use super::method::MethodKind;
@@ -81,6 +81,8 @@ pub struct AirspaceWorld {
     pub start_utc_s: Option<f64>,
     /// The wind, which all know, in meters per second.
     pub wind_m_s: Point,
+    /// Gusts beside it, which nobody knows.
+    pub gusts: Option<Gusts>,
     /// Random errors that no airplane knows.
     pub disturbance: Disturbance,
     /// Bounds on those errors for which the shield allows.
@@ -281,6 +283,17 @@ impl AirspaceWorld {
             wind_m_s: self.wind_m_s,
             surface: self.surface,
         }
+    }
+
+    /// Returns the properties of the air through which an airplane flies in a cycle, gusts included. What is planned
+    /// knows nothing of these.
+    pub(crate) fn flown_air(&self, slot: EntitySlot, now: Cycle) -> FlightConditions {
+        let mut air = self.flight_environment();
+        if let Some(gusts) = &self.gusts {
+            let [east_m_s, north_m_s] = gusts.velocity_m_s(&self.streams, slot, now);
+            air.wind_m_s = [air.wind_m_s[0] + east_m_s, air.wind_m_s[1] + north_m_s];
+        }
+        air
     }
 
     /// Returns when an airplane's flight would end if it were alone, in seconds after the start of

@@ -1,7 +1,8 @@
 //! Airplanes in the air during one `dt`.
 
 use crate::flight::{
-    ConstantRateLeg, FlightLevelRange, Frame, InterOrderSegment, Point, Pose2, RoutePosition, Track,
+    ConstantRateLeg, FlightConditions, FlightLevelRange, Frame, InterOrderSegment, Point, Pose2,
+    RoutePosition, Track,
 };
 use crate::scratch::PhaseContext;
 use crate::shield::{Fallback, TurnProfile};
@@ -31,6 +32,8 @@ pub(super) struct AircraftCycleMotion<'a> {
     pub(super) frame: Frame,
     /// The way-points of its route in the frame, as far as it can get in this `dt`.
     pub(super) mission: Cow<'a, [Point]>,
+    /// The air through which it flies.
+    pub(super) air: FlightConditions,
     /// Its pose in the frame.
     pub(super) pose: Pose2,
     pub(super) altitude_m: f64,
@@ -75,12 +78,13 @@ impl<'a> AircraftCycleMotion<'a> {
             _ => world.surface.frame_at(from.at),
         };
         let pose = frame.pose_to_local(from);
+        let air = world.flown_air(slot, context.now);
         let next = current.next.get() as usize;
         let mission = match &path {
             FlightPathSource::Profile { segment, .. } => {
                 let InterOrderSegment { model, mission, .. } = segment;
                 let route = RoutePosition { mission, next, pose };
-                world.flight_environment().local_mission(frame, model, route, world.timing.dt_s)
+                air.local_mission(frame, model, route, world.timing.dt_s)
             }
             FlightPathSource::Track(_) => Cow::default(),
         };
@@ -90,6 +94,7 @@ impl<'a> AircraftCycleMotion<'a> {
             from: from.at,
             frame,
             mission,
+            air,
             pose,
             altitude_m: current.altitude_m.get(),
             since_s,
@@ -101,7 +106,7 @@ impl<'a> AircraftCycleMotion<'a> {
     }
 
     /// Finds the legs that it flies in one step.
-    pub(super) fn find_step_legs(&mut self, wind_m_s: Point, moment: SubStep, dtau_s: f64) {
+    pub(super) fn find_step_legs(&mut self, moment: SubStep, dtau_s: f64) {
         self.legs.clear();
         match &self.path {
             FlightPathSource::Profile { profile, segment, .. } => {
@@ -117,7 +122,7 @@ impl<'a> AircraftCycleMotion<'a> {
                     0.0
                 };
                 let climb_m_s = if climbs_s > 0.0 { to_climb_m / climbs_s } else { 0.0 };
-                let first = whole.with_climb(self.altitude_m, climb_m_s).in_wind(wind_m_s);
+                let first = whole.with_climb(self.altitude_m, climb_m_s).in_wind(self.air.wind_m_s);
                 self.legs.push(first.with_times(0.0, dtau_s.min(climbs_s)));
                 if climbs_s < dtau_s {
                     self.legs.push(first.remainder(climbs_s).with_climb(segment.altitude_m, 0.0));

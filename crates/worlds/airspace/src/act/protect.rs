@@ -83,7 +83,9 @@ pub(super) fn store_maneuver(
 
 /// Moves the stored pose of an airplane along its orbit for one `dt`.
 fn advance_orbit_pose(context: &PhaseContext<'_>, slot: EntitySlot) {
-    let PhaseContext { world, state, .. } = context;
+    let PhaseContext { world, state, now, .. } = *context;
+    // Its orbit drifts with the air, as it does itself.
+    let air = world.flown_air(slot, now);
     let fallback = state.airplanes[slot as usize].fallback.get();
     let v_m_s = state.segment(world, slot).model.v_m_s;
     let omega = fallback.omega_rad_s(world.orbit_rad_s[slot as usize]);
@@ -91,11 +93,7 @@ fn advance_orbit_pose(context: &PhaseContext<'_>, slot: EntitySlot) {
     let frame = world.surface.fallback_frame(stored, v_m_s, omega);
     let mut orbit_pose = frame.pose_to_local(stored);
     for _ in 0..world.timing.points_per_dt() {
-        orbit_pose = world.flight_environment().after_wind_step(orbit_pose.step(
-            v_m_s,
-            omega,
-            world.timing.dtau_s,
-        ));
+        orbit_pose = air.after_wind_step(orbit_pose.step(v_m_s, omega, world.timing.dtau_s));
     }
     let orbit_pose = frame.pose_to_world(orbit_pose);
     state.set_orbit_pose(

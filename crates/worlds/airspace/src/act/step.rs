@@ -31,7 +31,7 @@ pub(super) fn fly_sub_steps(
             flight.end = (leaves_s <= moment.step_s).then_some(FlightEnd::Left(step));
         }
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
-            flight.find_step_legs(world.wind_m_s, moment, world.timing.dtau_s);
+            flight.find_step_legs(moment, world.timing.dtau_s);
         }
         // Distances are those during the step: the legs of all are known, and nobody has flown yet.
         approaches::record_distances(world, &flights, moment, context.scratch);
@@ -47,7 +47,7 @@ fn fly(
     flight: &mut AircraftCycleMotion<'_>,
     SubStep { k, step, .. }: SubStep,
 ) {
-    let air = world.flight_environment();
+    let air = flight.air;
     let dtau_s = world.timing.dtau_s;
     let is_at_end = match &flight.path {
         FlightPathSource::Profile { profile, segment, .. } => {

@@ -8,6 +8,7 @@
 //! track.rs  levels.rs                recorded tracks, and ranges of altitude
 //! leg.rs                             stretches of flight, and how near two of them come
 //! surface.rs  pair_plane.rs          a plane or the earth, and the planes in which motions are computed and compared
+//! gusts.rs                           a wind that no airplane knows
 //! chart.rs                           how positions are drawn
 //! ```
 
@@ -17,6 +18,7 @@ mod air;
 mod airplane;
 mod autopilot;
 mod chart;
+mod gusts;
 mod leg;
 mod levels;
 mod motion;
@@ -36,6 +38,8 @@ pub(crate) use airplane::DoneOrders;
 pub use airplane::{AirplaneStart, KnownAircraft};
 pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
 pub use chart::Chart;
+pub use gusts::Gusts;
+pub(crate) use gusts::MAX_CORRELATION_CYCLES;
 pub use leg::{ConstantRateLeg, PairApproach, SeparationMinima, is_separation_lost};
 pub use levels::FlightLevelRange;
 pub(crate) use motion::MAX_STEPS_PER_DT;

@@ -105,6 +105,7 @@ impl<'a> Compiler<'a> {
         let is_drawn = self.file.airspace.generator.is_some()
             || position_m > 0.0
             || heading_rad > 0.0
+            || world.gusts.is_some()
             || world.network.is_some();
         if is_drawn {
             return SeedEffect::Decide;
@@ -129,6 +130,7 @@ impl<'a> Compiler<'a> {
         let world = AirspaceWorld {
             network: self.network(&timing, &airplanes)?,
             wind_m_s: self.wind_m_s(&airplanes)?,
+            gusts: self.gusts(&timing, &airplanes)?,
             passing: self.waypoint_rule(&airplanes),
             airplanes: Arc::new(airplanes),
             timing,

@@ -8,7 +8,8 @@ use crate::settings::AbilityKeys;
 use sidestep_kernel::InputError;
 use sidestep_scenario::Spanned;
 
-/// Smallest turn rate in radians per second that an airplane may be left with: that of the keys, 0.001 degrees per second.
+/// Smallest turn rate in radians per second that an airplane may be left with: that of the keys, 0.001 degrees per
+/// second.
 const MIN_TURN_RAD_S: f64 = 1e-3 * std::f64::consts::PI / 180.0;
 
 /// Largest turn rate that a scenario may give, in degrees per second.
