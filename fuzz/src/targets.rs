@@ -6,8 +6,8 @@ use sidestep::experiment::sweep::Sweep;
 use sidestep::import::table::CsvTable;
 use sidestep::import::urdf::{Model, srdf::Semantics};
 use sidestep::import::{
-    ForeignFormat, ascii, bag, bluesky, carmen, image::Bitmap, lorr, mesh, movingai, mrclam,
-    openap, rosmap, stage, traffic,
+    ForeignFormat, ascii, bag, bluesky, carmen, geojson, image::Bitmap, lorr, mesh, movingai,
+    mrclam, openap, rosmap, stage, traffic,
 };
 use sidestep::kernel::checkpoint;
 use sidestep::learn::{effector, sensor};
@@ -42,6 +42,7 @@ pub(crate) const TARGETS: &[Target] = &[
     ("obj", |data| drop(mesh::obj::parse("f", data))),
     ("dae", |data| drop(mesh::dae::parse("f", data))),
     ("bluesky", |data| text(data, |t| drop(bluesky::parse(&"f", t)))),
+    ("geojson", |data| text(data, |t| drop(geojson::parse("f", t)))),
     ("traffic", |data| text(data, recorded)),
     ("traffic_parquet", |data| {
         drop(traffic::from_bytes(&"f", data.to_vec(), &Default::default()));

@@ -13,6 +13,7 @@ pub mod carmen;
 mod char_map;
 mod extension;
 mod foreign_file;
+pub mod geojson;
 pub mod image;
 mod imported_map;
 pub mod local_plane;

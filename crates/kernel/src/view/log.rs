@@ -147,6 +147,10 @@ log_event_kinds! {
     Gridlock = "gridlock",
     /// Such bodies move again.
     GridlockEnded = "gridlock-ended",
+    /// A body has come to where an area does not permit it to be; the value is the number of the area.
+    AreaEntry = "area-entry",
+    /// The shield does not keep a body clear of an area; the value is the number of the area.
+    AreaExempt = "area-exempt",
 }
 
 /// The severity of an event, rising.

@@ -11,6 +11,7 @@
 //! ```
 
 mod approaches;
+mod areas;
 mod controls;
 mod direct;
 mod entry;
@@ -98,6 +99,7 @@ pub(super) fn prepare_decisions(
     if context.world.shield {
         entry::release_exempt(context, &flown.ids);
         entry::assign_fallbacks(context, &flown.ids);
+        areas::report_exempt_areas(context, &flown.ids);
         errors::report_beyond_bound(context, &flown.ids);
     }
     orders::execute_due_orders(context, group, &flown.ids);
@@ -134,7 +136,7 @@ fn decide_flown_profiles(
             controls: &controls,
             considered: &considered,
         };
-        trace.record_decisions(world, &decided);
+        trace.record_decisions(world, now, &decided);
     }
     let profiles = apply_controls(context, &own, non_cooperative, controls);
     if let Some(trace) = &mut context.scratch.trace {

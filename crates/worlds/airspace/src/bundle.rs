@@ -3,12 +3,13 @@
 use super::scenario::CompiledAirspace;
 use sidestep_kernel::InputError;
 use sidestep_scenario::{Bundle, ResolvedScenario, Source};
+use std::path::Path;
 
-/// Returns the scenario as it ran. Its number of cycles may follow from the flights, and types of airplanes are stored as
-/// they were read: a later version may have other built-in ones.
+/// Returns the scenario as it ran, with the file of its areas. Its number of cycles may follow from the flights, and types of
+/// airplanes are stored as they were read: a later version may have other built-in ones.
 ///
 /// # Errors
-/// When the text is no longer a valid scenario.
+/// When the text is no longer a valid scenario, or the file can no longer be read.
 pub(crate) fn resolve_scenario(
     source: &Source,
     compiled: &CompiledAirspace,
@@ -17,6 +18,11 @@ pub(crate) fn resolve_scenario(
     if let Some(types) = compiled.types_text() {
         let path = bundle.add("types.toml", types.into_bytes());
         bundle.set("airspace.types_file", format_args!("{path:?}"));
+    }
+    if let Some(path) = compiled.areas_file() {
+        let file = Path::new(path).file_name().unwrap_or_default().display();
+        let path = bundle.copy(&format!("areas-{file}"), path)?;
+        bundle.set("airspace.areas_file", format_args!("{path:?}"));
     }
     bundle.finish()
 }

@@ -1,5 +1,6 @@
 //! *Decide*: the choice of actions for the airplanes of a group, by the world's method.
 
+mod around_areas;
 mod external;
 mod group_memory;
 mod local_flight;
@@ -17,11 +18,12 @@ use super::external_action::ExternalAction;
 use super::flight::{Action, KnownAircraft};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
-use super::objective::{ActionPredictions, build_group_game};
+use super::objective::{ActionPredictions, build_group_game, own_costs};
 use super::purpose;
 use super::settings::Deployment;
 use super::shield::TurnProfile;
 use super::world::AirspaceWorld;
+use around_areas::has_areas_ahead;
 pub(super) use group_memory::max_group_memory_bytes;
 use preferences::rank_straight_first;
 use serde::{Deserialize, Serialize};
@@ -155,10 +157,23 @@ pub(super) fn candidates_alone(
     world: &AirspaceWorld,
     known: KnownAircraft,
     external_action: Option<&ExternalAction>,
+    now: Cycle,
 ) -> ManeuverCandidates {
     match world.method {
         MethodKind::External => {
             external::candidates_for_external_action(world, known, external_action)
+        }
+        MethodKind::Pc if has_areas_ahead(world, known, now) => {
+            let options = world.action_predictions(known, &[], now);
+            let costs = own_costs(&world.objective, &options);
+            ManeuverCandidates::from_actions(
+                world,
+                known,
+                preferences::rank_by_own_cost(world, known, &costs),
+            )
+        }
+        _ if has_areas_ahead(world, known, now) => {
+            ManeuverCandidates::from_profiles(velocity::profiles_alone(world, known, now))
         }
         _ => ManeuverCandidates::from_actions(world, known, rank_straight_first(world, known)),
     }
@@ -203,7 +218,7 @@ pub(super) fn candidates_for_group(
 ) -> Vec<ManeuverCandidates> {
     match DecisionStrategy::for_group(world, group, non_cooperative.len()) {
         DecisionStrategy::Independent | DecisionStrategy::GroupTooLarge => {
-            group.iter().map(|known| candidates_alone(world, *known, None)).collect()
+            group.iter().map(|known| candidates_alone(world, *known, None, now)).collect()
         }
         DecisionStrategy::Reactive => {
             candidates_by_velocity(world, group, non_cooperative, memory, now)
@@ -238,7 +253,7 @@ pub(super) fn decide_centrally(
     let mut options = Vec::new();
     for (known, weight) in group.iter().zip(world.deviation_weights(group)) {
         ids.push(known.slot);
-        let predictions = world.action_predictions(*known, non_cooperative);
+        let predictions = world.action_predictions(*known, non_cooperative, now);
         options.push(predictions.with_deviation_weight(weight));
     }
     decide_by_predictions(world, &ids, &options, now).into_iter().map(Some).collect()
@@ -260,13 +275,15 @@ pub(super) fn joint_action_cost(
     group: &[KnownAircraft],
     non_cooperative: &[NonCooperativeAircraft],
     joint: &[usize],
+    now: Cycle,
 ) -> JointActionCost {
     let weights = world.deviation_weights(group);
     let options: Vec<ActionPredictions> = group
         .iter()
         .zip(weights)
         .map(|(known, weight)| {
-            world.action_predictions(*known, non_cooperative).with_deviation_weight(weight)
+            let predictions = world.action_predictions(*known, non_cooperative, now);
+            predictions.with_deviation_weight(weight)
         })
         .collect();
     let game = build_group_game(&world.objective, &options);

@@ -35,6 +35,11 @@ pub enum EventKind {
     Intruder,
     /// An airplane with an external pilot stays on its fallback, because no control of it came in time.
     Absent,
+    /// An airplane has come to where an area does not permit it to be; the value is the number of the area.
+    AreaEntry,
+    /// The shield does not keep an airplane clear of an area, because it has no fallback that is clear of it; the value
+    /// is the number of the area.
+    AreaExempt,
 }
 
 /// The quantity that the value of an event measures: each has a column of its own in the table.
@@ -65,13 +70,17 @@ impl EventKind {
         match self {
             Self::LossOfSeparation | Self::Intruder => Some(EventQuantity::Distance),
             Self::Arrival => Some(EventQuantity::Delay),
-            Self::Override | Self::GroupTooLarge | Self::BeyondBound => Some(EventQuantity::Number),
+            Self::Override
+            | Self::GroupTooLarge
+            | Self::BeyondBound
+            | Self::AreaEntry
+            | Self::AreaExempt => Some(EventQuantity::Number),
             Self::Orbit | Self::Unheard | Self::Deadline | Self::HeldBack | Self::Absent => None,
         }
     }
 
     /// All kinds; the table of events stores places in this list.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::LossOfSeparation,
         Self::Arrival,
         Self::Override,
@@ -83,6 +92,8 @@ impl EventKind {
         Self::BeyondBound,
         Self::Intruder,
         Self::Absent,
+        Self::AreaEntry,
+        Self::AreaExempt,
     ];
 
     /// Returns the kind that it is for viewers, which know no world.
@@ -99,6 +110,8 @@ impl EventKind {
             Self::BeyondBound => LogEventKind::BeyondBound,
             Self::Intruder => LogEventKind::Intruder,
             Self::Absent => LogEventKind::Absent,
+            Self::AreaEntry => LogEventKind::AreaEntry,
+            Self::AreaExempt => LogEventKind::AreaExempt,
         }
     }
 
@@ -116,6 +129,8 @@ impl EventKind {
             Self::BeyondBound => "beyond-bound",
             Self::Intruder => "intruder",
             Self::Absent => "absent",
+            Self::AreaEntry => "area-entry",
+            Self::AreaExempt => "area-exempt",
         }
     }
 }

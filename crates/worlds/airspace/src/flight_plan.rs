@@ -25,8 +25,8 @@ pub(super) const CLIMB_M_S: f64 = 7.62;
 /// A position, height or angle within reasonable bounds.
 type BoundedNumber = Number<Closed<-1_000_000_000, 1_000_000_000>>;
 /// A time within reasonable bounds, not before the start.
-type BoundedTime = Number<Closed<0, 1_000_000_000>>;
-type BoundedPoint = Point<2, Closed<-1_000_000_000, 1_000_000_000>>;
+pub(super) type BoundedTime = Number<Closed<0, 1_000_000_000>>;
+pub(super) type BoundedPoint = Point<2, Closed<-1_000_000_000, 1_000_000_000>>;
 /// Latitude and longitude in degrees; the latitude is checked beside that.
 pub(super) type LatLonDeg = Point<2, Closed<-360, 360>>;
 

@@ -1,6 +1,7 @@
 //! Knowledge of an airplane, the expected cost of each of its actions, its choice, the shield's decision on
 //! that, and the outcome: the cycle is tried on a copy of the state, for its group alone.
 
+mod areas;
 mod sections;
 #[cfg(test)]
 mod tests;
@@ -84,6 +85,7 @@ impl Inspector<'_> {
         self.add_knowledge_section(&mut inspection);
         self.add_decision(&mut inspection);
         self.add_shield_section(&mut inspection);
+        self.add_areas_section(&mut inspection);
         self.add_messages_section(&mut inspection);
         self.add_outcome(&mut inspection);
         inspection

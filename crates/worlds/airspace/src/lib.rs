@@ -9,7 +9,7 @@
 //!
 //! ```text
 //! settings   settings/: choices and bounds of a scenario        purpose.rs: purposes of random draws
-//! flight     flight/: motion, orders, tracks                    non_cooperative.rs, flight_plan.rs, generate.rs
+//! flight     flight/: motion, orders, tracks    areas/: areas   non_cooperative.rs, flight_plan.rs, generate.rs
 //! shield     shield/: plans that stay safe forever              avoid.rs: paths clear of non-cooperative aircraft
 //! agents     agents/: programs aboard, and their messages       objective.rs: the minimized cost    baseline/: ORCA, MVP
 //! pilot      pilot/: an aircraft from percept to control        world.rs (immutable)    decide.rs: candidates
@@ -19,6 +19,7 @@
 
 mod act;
 pub mod agents;
+pub mod areas;
 mod avoid;
 pub mod baseline;
 mod bundle;

@@ -14,13 +14,19 @@ pub(super) static METRIC_INFO: LazyLock<Vec<MetricInfo>> = LazyLock::new(|| {
     infos
 });
 
-const TABLE_INFO: [MetricInfo; 4] = [
+const TABLE_INFO: [MetricInfo; 5] = [
     MetricInfo { name: "airplane", words: "airplane", unit: "", meaning: "the airplane's number" },
     MetricInfo {
         name: "too_close_count",
         words: "pairs without a promise",
         unit: "",
         meaning: "pairs for which the shield promises nothing",
+    },
+    MetricInfo {
+        name: "exempt_areas_count",
+        words: "exemptions from areas",
+        unit: "",
+        meaning: "airplanes that the shield does not keep clear of an area",
     },
     MetricInfo {
         name: "beyond_bound_count",

@@ -26,6 +26,27 @@ pub struct Counters {
     pub beyond_bound: BTreeMap<EntityId, Cycle>,
     /// Losses of separation of pairs of recorded flights, by their phase.
     pub losses_by_phase: BTreeMap<FlightPhase, u64>,
+    /// Airplanes that were where an area does not permit it, by airplane and number of the area.
+    pub areas: BTreeMap<(EntityId, u32), AreaRecord>,
+    /// Airplanes that the shield does not keep clear of an area, with the first cycle of each.
+    pub exempt_areas: BTreeMap<(EntityId, u32), Cycle>,
+}
+
+/// The time of an airplane where an area does not permit it to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct AreaRecord {
+    /// Number of times that it came there.
+    pub entries: u32,
+    /// Time there, in nanoseconds.
+    pub inside_ns: u64,
+}
+
+impl AreaRecord {
+    /// Adds a later record.
+    pub(super) fn add(&mut self, later: Self) {
+        self.entries += later.entries;
+        self.inside_ns += later.inside_ns;
+    }
 }
 
 impl Counters {
@@ -37,6 +58,16 @@ impl Counters {
     /// when it is named again.
     pub(super) fn add_too_close_pair(&mut self, now: Cycle, (a, b): (EntityId, EntityId)) {
         let first = self.too_close.entry((a.min(b), a.max(b))).or_insert(now);
+        *first = now.min(*first);
+    }
+
+    pub(super) fn add_area(&mut self, key: (EntityId, u32), record: AreaRecord) {
+        self.areas.entry(key).or_default().add(record);
+    }
+
+    /// Records that the shield does not keep an airplane clear of an area.
+    pub(super) fn add_exempt_area(&mut self, now: Cycle, key: (EntityId, u32)) {
+        let first = self.exempt_areas.entry(key).or_insert(now);
         *first = now.min(*first);
     }
 
@@ -74,6 +105,15 @@ metrics! {
         pub losses_in_cruise: Option<u64> => "losses in cruise",
         /// Time that pairs spent nearer than their separation. In seconds.
         pub lost_s: f64 => "time with separation lost",
+        /// Times that an airplane came to where an area does not permit it to be; none without areas.
+        pub area_entries: Option<u64> => "entries of areas",
+        /// Entries of airplanes that the shield had reported, because it does not keep them clear of the area. These are
+        /// those in `exempt_areas`, those of airplanes in `beyond_bound`, and non-cooperative ones.
+        pub area_entries_reported: Option<u64> => "reported entries of areas",
+        /// All other entries, of which the shield promises that there are none. Without a shield these are all.
+        pub area_entries_unreported: Option<u64> => "unreported entries of areas",
+        /// Time that airplanes spent where areas do not permit them to be. In seconds; none without areas.
+        pub area_s: Option<f64> => "time in areas",
         /// Airplanes that have reached their last way-point.
         pub arrived: u64 => "airplanes arrived",
         /// All airplanes.
@@ -154,6 +194,8 @@ metrics! {
         pub orders_delayed: u64 => "orders delayed",
         /// Pairs for which the shield promises nothing, and since when.
         pub too_close: Vec<UnprotectedPair> => "pairs without a promise",
+        /// Airplanes that the shield does not keep clear of an area, and since when.
+        pub exempt_areas: Vec<AreaExemption> => "exemptions from areas",
         /// Airplanes whose errors exceeded the bounds, and since when. The shield promises nothing for their pairs.
         pub beyond_bound: Vec<ErrorBoundViolation> => "airplanes beyond their bounds",
     }
@@ -169,6 +211,20 @@ pub struct ErrorBoundViolation {
     /// Its call sign.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub callsign: Option<String>,
+}
+
+/// An airplane that the shield does not keep clear of an area.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AreaExemption {
+    /// Time when that was reported first, in seconds after the start of the run.
+    pub at_s: f64,
+    /// Id of the airplane.
+    pub airplane: EntityId,
+    /// Its call sign.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callsign: Option<String>,
+    /// Name of the area, or else its number.
+    pub area: String,
 }
 
 /// Two airplanes that were too near each other for the shield when the later one came in, or one of
@@ -318,6 +374,21 @@ fn losses_by_report(counters: &Counters) -> [u64; 2] {
     losses
 }
 
+/// Returns the number of entries of areas that the shield reported, and of all others.
+fn area_entries_by_report(world: &AirspaceWorld, counters: &Counters) -> [u64; 2] {
+    let mut entries = [0, 0];
+    for (key, record) in &counters.areas {
+        let airplane = &world.airplanes[key.0 as usize];
+        let is_reported = counters.exempt_areas.contains_key(key)
+            || counters.beyond_bound.contains_key(&key.0)
+            || airplane.is_non_cooperative
+            || airplane.track.is_some();
+        // One that came in between two steps was not seen to.
+        entries[usize::from(!is_reported)] += u64::from(record.entries.max(1));
+    }
+    entries
+}
+
 /// Returns the losses of recorded flights in a phase; none where no two are recorded.
 fn losses_in_phase(world: &AirspaceWorld, counters: &Counters, phase: FlightPhase) -> Option<u64> {
     let recorded = world.airplanes.iter().filter(|airplane| airplane.track.is_some());
@@ -371,6 +442,8 @@ pub(crate) fn metrics(
         beacons,
     } = counters.effort;
     let [losses_of_reported_pairs, losses_of_unreported_pairs] = losses_by_report(counters);
+    let [area_entries_reported, area_entries_unreported] = area_entries_by_report(world, counters);
+    let beside_areas = |entries: u64| (!world.areas.is_empty()).then_some(entries);
     let losses_in = |phase| losses_in_phase(world, counters, phase);
     let delay_in = |phase| delay_in_phase(world, &all, phase);
     let not_appeared = not_appeared_count(world, now);
@@ -384,6 +457,11 @@ pub(crate) fn metrics(
         losses_in_descent: losses_in(FlightPhase::Descent),
         losses_in_cruise: losses_in(FlightPhase::Cruise),
         lost_s: counters.pairs.values().map(|r| r.lost_ns).sum::<u64>() as f64 / 1e9,
+        area_entries: beside_areas(area_entries_reported + area_entries_unreported),
+        area_entries_reported: beside_areas(area_entries_reported),
+        area_entries_unreported: beside_areas(area_entries_unreported),
+        area_s: (!world.areas.is_empty())
+            .then(|| counters.areas.values().map(|r| r.inside_ns).sum::<u64>() as f64 / 1e9),
         arrived: count_airplanes_where(state, |airplane| airplane.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
@@ -421,6 +499,7 @@ pub(crate) fn metrics(
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
         too_close: unprotected_pairs(world, counters),
+        exempt_areas: area_exemptions(world, counters),
         beyond_bound: error_bound_violations(world, counters),
     }
 }
@@ -439,6 +518,20 @@ fn error_bound_violations(world: &AirspaceWorld, counters: &Counters) -> Vec<Err
             at_s: world.cycle_start_s(cycle),
             airplane,
             callsign: world.callsign(airplane),
+        })
+        .collect()
+}
+
+/// Returns the airplanes that the shield does not keep clear of areas, by the time when that began.
+fn area_exemptions(world: &AirspaceWorld, counters: &Counters) -> Vec<AreaExemption> {
+    let mut all: Vec<_> = counters.exempt_areas.iter().map(|(&key, &cycle)| (cycle, key)).collect();
+    all.sort_unstable();
+    all.into_iter()
+        .map(|(cycle, (airplane, number))| AreaExemption {
+            at_s: world.cycle_start_s(cycle),
+            airplane,
+            callsign: world.callsign(airplane),
+            area: world.areas[number as usize].display_name(number as usize),
         })
         .collect()
 }

@@ -6,7 +6,10 @@
 //! Gdev_i     = |f_i(x_i, kmax) - f_i(x_i_opt, kmax)|^2                                (10)
 //! ```
 
-use super::flight::{FlightLevelRange, Frame, PairPlane, Point, Prediction, RigidMotion};
+use super::areas::{AreaContext, LocalArea};
+use super::flight::{
+    FlightLevelRange, Frame, PairPlane, Point, Prediction, RigidMotion, distance_m,
+};
 use super::non_cooperative::NonCooperativeAircraft;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::PairwiseGame;
@@ -119,6 +122,11 @@ impl Objective {
     }
 }
 
+/// Weight of a meter beyond a border against one of a lost separation: areas are to be kept clear of first.
+const AREA_WEIGHT: f64 = 4.0;
+/// Distance from borders that the objective asks for, in separations, so that airplanes need not be stopped there.
+const AREA_GAP_SEPARATIONS: f64 = 0.1;
+
 /// Number of points of a slice of time. Within a slice airplanes move little, so bounds around it are
 /// tight.
 const SLICE: usize = 16;
@@ -138,6 +146,8 @@ pub struct ActionPredictions {
     deviation_weight: f64,
     /// Costs of the actions beside non-cooperative aircraft; empty where there are none.
     non_cooperative_costs: Vec<f64>,
+    /// Costs of the actions in areas; empty where there are none.
+    area_costs: Vec<f64>,
     slices: Vec<TimeSlice>,
     /// Largest distance of a point from the origin of the frame, in meters.
     reach_m: f64,
@@ -162,6 +172,7 @@ impl ActionPredictions {
             levels,
             deviation_weight: 1.0,
             non_cooperative_costs: Vec::new(),
+            area_costs: Vec::new(),
             slices,
             reach_m,
         }
@@ -171,6 +182,44 @@ impl ActionPredictions {
     #[must_use]
     pub(crate) fn with_deviation_weight(self, deviation_weight: f64) -> Self {
         Self { deviation_weight, ..self }
+    }
+
+    /// Returns the same options among areas: each second beyond a border, or nearer to it than asked for, costs the square
+    /// of the meters, with the weight that a lost separation has then.
+    #[must_use]
+    pub(crate) fn with_areas(
+        mut self,
+        context: &AreaContext<'_>,
+        objective: &Objective,
+        dtau_s: f64,
+    ) -> Self {
+        let start = self.predictions.iter().find_map(|prediction| prediction.points.first());
+        let Some(&start) = start.filter(|_| !context.areas.is_empty()) else { return self };
+        let gap_m = AREA_GAP_SEPARATIONS * self.separation_m;
+        // Within that of where it begins, because both are within reach of the origin; in a plane that is far away.
+        let points = self.predictions.iter().flat_map(|prediction| &prediction.points);
+        let path_m = points.map(|&at| distance_m(start, at)).fold(0.0, f64::max);
+        let Some(near) = context.near(self.frame, self.frame.to_world(start), path_m + gap_m)
+        else {
+            return self;
+        };
+        let on_levels: Vec<_> =
+            near.iter().filter(|area| area.is_on_levels(&self.levels)).collect();
+        let cost = |prediction: &Prediction| {
+            let points = &prediction.points[..objective.counted_points(prediction)];
+            let of_area = |area: &&LocalArea| {
+                let mut weight = AREA_WEIGHT;
+                let mut sum = 0.0;
+                for shortfall_m in area.shortfalls_m(points, dtau_s, gap_m) {
+                    sum += weight * shortfall_m * shortfall_m;
+                    weight *= objective.beta;
+                }
+                sum
+            };
+            on_levels.iter().map(of_area).sum()
+        };
+        self.area_costs = self.predictions.iter().map(cost).collect();
+        self
     }
 
     /// Returns the same options beside non-cooperative aircraft, seen at each point of the predictions.
@@ -314,7 +363,7 @@ pub fn build_group_game(objective: &Objective, group: &[ActionPredictions]) -> P
     game
 }
 
-/// Returns the sum of `alpha Gdev` of every action and its cost beside non-cooperative aircraft.
+/// Returns the sum of `alpha Gdev` of every action and its costs beside non-cooperative aircraft and among areas.
 pub(super) fn own_costs(objective: &Objective, options: &ActionPredictions) -> Vec<f64> {
     let optimal = options.predictions.last().expect("every airplane has an optimal action");
     let alpha = objective.alpha * options.deviation_weight;
@@ -323,8 +372,8 @@ pub(super) fn own_costs(objective: &Objective, options: &ActionPredictions) -> V
         .iter()
         .map(|prediction| alpha * objective.deviation_cost(prediction, optimal))
         .collect();
-    for (cost, further) in costs.iter_mut().zip(&options.non_cooperative_costs) {
-        *cost += further;
+    for further in [&options.non_cooperative_costs, &options.area_costs] {
+        costs.iter_mut().zip(further).for_each(|(cost, further)| *cost += further);
     }
     costs
 }

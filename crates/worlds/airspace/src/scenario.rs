@@ -1,7 +1,9 @@
 //! The text of an airspace scenario, and its compiled form.
 
 mod airplanes;
+mod areas;
 mod compile;
+mod detours;
 mod earth;
 mod effectless;
 mod gusts;
@@ -25,6 +27,7 @@ use super::shield::Fallback;
 use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
 use airplanes::{GeneratorSection, ModelSection};
+use areas::{AreaSection, load_areas_file};
 use compile::Compiler;
 use gusts::GustsSection;
 use network::NetworkSection;
@@ -35,6 +38,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sidestep_collectives::{Choice, Estimator, LocalSearch, Update, UpdateOrder, Utility};
+use sidestep_import::geojson::GeoAreas;
 use sidestep_kernel::network::fingerprint;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -100,6 +104,10 @@ struct AirspaceSection {
     inflation: Option<Number<Inflation>>,
     holds_s: TimeList,
     legs: Option<Spanned<LegsSection>>,
+    /// File of areas in GeoJSON, beside those that are given here.
+    areas_file: Option<Spanned<String>>,
+    /// Areas to stay out of, or inside of.
+    areas: Vec<Spanned<AreaSection>>,
     /// Rules that change on the way.
     changes: Vec<Spanned<RuleChangeSection>>,
     mvp: MvpSection,
@@ -191,17 +199,24 @@ struct ParsedScenario {
     file: AirspaceFile,
     /// The types of airplanes that it names.
     types: TypeTable,
+    /// The content of its file of areas.
+    areas_file: Option<GeoAreas>,
     /// Methods beside the built-in ones.
     own: Methods,
 }
 
 impl ParsedScenario {
-    /// Returns a digest of all that decides how airplanes fly: the text, the seed, and the types from other files.
+    /// Returns the digest by which agents recognize those of the same scenario: of all that decides how airplanes fly, the
+    /// text, the seed, and what other files say of types and areas.
     fn fingerprint(&self, seed: u64) -> u64 {
-        if self.types.is_empty() {
-            return fingerprint(&self.source.text, seed);
+        let mut text = self.source.text.clone();
+        if !self.types.is_empty() {
+            text += &self.types.text();
         }
-        fingerprint(&format!("{}{}", self.source.text, self.types.text()), seed)
+        if let Some(found) = &self.areas_file {
+            text += &format!("{:?}", found.areas);
+        }
+        fingerprint(&text, seed)
     }
 }
 
@@ -221,7 +236,9 @@ impl CompiledAirspace {
     pub fn with_methods(source: &Source, own: &Methods) -> Result<Self, InputError> {
         let (head, file) = source.parse_world::<AirspaceFile>()?;
         let types = TypeTable::load(source, &file)?;
-        let recipe = ParsedScenario { source: source.clone(), head, file, types, own: own.clone() };
+        let areas_file = load_areas_file(source, file.airspace.areas_file.as_ref())?;
+        let own = own.clone();
+        let recipe = ParsedScenario { source: source.clone(), head, file, types, areas_file, own };
         Compiler::new(&Arc::new(recipe)).compile()
     }
 
@@ -249,6 +266,11 @@ impl CompiledAirspace {
     pub(super) fn types_text(&self) -> Option<String> {
         let types = &self.recipe.types;
         (!types.is_empty()).then(|| types.text())
+    }
+
+    /// Returns the path of the file of its areas, if it names one.
+    pub(crate) fn areas_file(&self) -> Option<&str> {
+        self.recipe.file.airspace.areas_file.as_ref().map(|file| &file.get_ref()[..])
     }
 
     /// Returns the state at the start.

@@ -4,6 +4,7 @@ use crate::agents::network_traffic::NetworkTraffic;
 use crate::decide::OptimizationRecord;
 use crate::events::Event;
 use crate::flight::FlightPhase;
+use crate::metrics::AreaRecord;
 use crate::rows::FlownLeg;
 use crate::state::PairRecord;
 use crate::trace::InspectionTrace;
@@ -30,6 +31,10 @@ pub struct Scratch {
     pub(crate) flown: Vec<FlownLeg>,
     /// Pairs that were named, for which the shield promises nothing: cycle and both airplanes.
     pub(crate) too_close: Vec<(Cycle, EntitySlot, EntitySlot)>,
+    /// Times of airplanes in areas, by airplane and number of the area.
+    pub(crate) areas: BTreeMap<(EntitySlot, u32), AreaRecord>,
+    /// Airplanes that the shield does not keep clear of an area: cycle, airplane, and number of the area.
+    pub(crate) exempt_areas: Vec<(Cycle, EntitySlot, u32)>,
     /// Processor time spent deciding, in nanoseconds: reported beside the results, never part of
     /// them.
     pub(crate) decide_ns: u64,

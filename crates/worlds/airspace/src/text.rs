@@ -1,8 +1,9 @@
 //! Texts for people: a scenario's contents, a run's outcome, and the pose of every airplane.
 
+use super::areas::{Area, AreaKind};
 use super::decide::DecisionStrategy;
 use super::flight::Surface;
-use super::metrics::{ErrorBoundViolation, Metrics, UnprotectedPair};
+use super::metrics::{AreaExemption, ErrorBoundViolation, Metrics, UnprotectedPair};
 use super::scenario::CompiledAirspace;
 use super::state::Snapshot;
 use super::world::AirspaceWorld;
@@ -13,6 +14,7 @@ use sidestep_kernel::text::{
 };
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::sync::Arc;
 
 /// Returns what is known of a scenario before it runs.
 pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> JsonTextReport {
@@ -38,6 +40,7 @@ pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> JsonTextReport {
         "cycles": compiled.cycles,
         "seed": compiled.seed,
         "too_close": compiled.too_close,
+        "areas": world.areas.len(),
         "origin_deg": world.origin_deg,
         "surface": match world.surface {
             Surface::Plane => "plane",
@@ -65,6 +68,7 @@ pub(super) fn describe_scenario(compiled: &CompiledAirspace) -> JsonTextReport {
     lines.extend(scenario_timing_text(compiled));
     lines.extend(geographic_origin_text(world));
     lines.extend(surface_text(world));
+    lines.extend(areas_text(world));
     lines.extend(too_close_warning(world, &compiled.too_close));
     JsonTextReport { json, text: align_pairs(&lines) }
 }
@@ -125,6 +129,20 @@ fn surface_text(world: &AirspaceWorld) -> Option<(String, String)> {
         "earth",
         format!("WGS84 ellipsoid, each pair in a plane of its own{margin}"),
     ))
+}
+
+/// Returns the first areas, and the number of others.
+fn areas_text(world: &AirspaceWorld) -> Option<(String, String)> {
+    let numbered: Vec<(usize, &Arc<Area>)> = world.areas.iter().enumerate().collect();
+    let names = first_names(&numbered, |(number, area)| {
+        let kind = match area.kind {
+            AreaKind::Out => "out of",
+            AreaKind::In => "inside of",
+        };
+        let moves = if area.is_moving() { ", which moves" } else { "" };
+        format!("{kind} {}{moves}", area.display_name(*number))
+    })?;
+    Some(key_value_pair("areas", format!("stay {names}")))
 }
 
 /// Returns the separations, speeds and turn rates of the airplanes, and how they decide.
@@ -198,10 +216,12 @@ fn round_to_tenth(number: f64) -> f64 {
 /// Returns the outcome of a run; parts of which there is nothing to say have no line.
 pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
     let mut lines = flight_metrics_text(metrics);
+    lines.extend(area_entries_text(metrics));
     lines.extend(not_appeared_warning(metrics));
     lines.extend(network(metrics));
     lines.extend(orders_and_tracks_text(metrics));
     lines.extend(unprotected_pairs_warning(&metrics.too_close));
+    lines.extend(exempt_areas_warning(&metrics.exempt_areas));
     lines.extend(beyond_bound_warning(&metrics.beyond_bound));
     lines
 }
@@ -338,6 +358,32 @@ fn beyond_bound_warning(all: &[ErrorBoundViolation]) -> Option<(String, String)>
         format!("{name} at {} s", one.at_s)
     })?;
     Some(key_value_pair("WARNING", format!("errors beyond the bound: {names}")))
+}
+
+/// Returns the first airplanes that the shield does not keep clear of an area, and the number of others.
+fn exempt_areas_warning(all: &[AreaExemption]) -> Option<(String, String)> {
+    let names = first_names(all, |AreaExemption { at_s, airplane, callsign, area }| {
+        let name = callsign.clone().unwrap_or_else(|| airplane.to_string());
+        let since = if *at_s > 0.0 { format!(" at {at_s} s") } else { String::new() };
+        format!("{name} of {area}{since}")
+    })?;
+    Some(key_value_pair("WARNING", format!("not kept clear by the shield: {names}")))
+}
+
+/// Returns how often airplanes came to where areas do not permit them to be; none without areas.
+fn area_entries_text(m: &Metrics) -> Option<(String, String)> {
+    let words = match m.area_entries? {
+        0 => "none entered".into(),
+        entries => {
+            let reported = group_thousands(m.area_entries_reported.unwrap_or(0));
+            let seconds = m.area_s.unwrap_or(0.0);
+            format!(
+                "entered {} times ({reported} reported), {seconds:.1} s in all",
+                group_thousands(entries)
+            )
+        }
+    };
+    Some(key_value_pair("areas", words))
 }
 
 /// Returns the first pairs whose separation the shield does not guarantee, and the number of others.

@@ -10,7 +10,7 @@ use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OwnshipState};
 use crate::shield::{Fallback, SafeManeuver, ShieldDecision, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
-use sidestep_kernel::{EntityId, EntitySlot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 
 /// Records for an inspection; no run makes any.
 #[derive(Debug, Default)]
@@ -61,7 +61,12 @@ pub(crate) struct GroupDecisions<'a> {
 
 impl InspectionTrace {
     /// Records the knowledge, the considerations and the decisions of a group.
-    pub(crate) fn record_decisions(&mut self, world: &AirspaceWorld, decided: &GroupDecisions<'_>) {
+    pub(crate) fn record_decisions(
+        &mut self,
+        world: &AirspaceWorld,
+        now: Cycle,
+        decided: &GroupDecisions<'_>,
+    ) {
         let &GroupDecisions { own, non_cooperative, controls, considered } = decided;
         let Some(me) = self.place_in_group(own.iter().map(|own| own.id)) else { return };
         self.group = own.iter().map(OwnshipState::as_known_aircraft).collect();
@@ -79,7 +84,7 @@ impl InspectionTrace {
         }
         if world.shield {
             let group: Vec<ShieldedAircraft> =
-                own.iter().map(|own| own.shielded_aircraft(world)).collect();
+                own.iter().map(|own| own.shielded_aircraft(world, now)).collect();
             let mut decisions = Vec::with_capacity(group.len());
             for (aircraft, control) in group.iter().zip(controls) {
                 let maneuver = control.as_ref().map_or(&Maneuver::Orbit, |one| &one.maneuver);

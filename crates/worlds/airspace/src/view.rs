@@ -1,5 +1,6 @@
 //! The visible part of an airspace: airplanes, the zones around them, their starts and goals.
 
+use super::areas::{Area, AreaKind};
 use super::events::{Event, EventKind};
 use super::flight::{Point, Pose2};
 use super::state::AirspaceState;
@@ -18,6 +19,8 @@ const LENGTH_FRACTION: f64 = 0.6;
 const WIDTH_FRACTION: f64 = 0.7;
 /// Height of a zone, as a fraction of its radius: a flat disc hides little.
 const ZONE_HEIGHT_FRACTION: f64 = 0.02;
+/// Thickness of the border of an area, as a fraction of the largest zone's radius.
+const BORDER_FRACTION: f64 = 0.1;
 /// Radius of a goal, as a fraction of the zone's radius.
 const GOAL_FRACTION: f64 = 0.15;
 
@@ -37,6 +40,8 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
             bodies.push(Body::new(BodyKind::GOAL, id, pose, Shape::Sphere { radius_m }));
         }
     }
+    let permanent = |area: &Area| area.is_permanent();
+    bodies.extend(area_bodies(world, 0.0, permanent));
     Scenery {
         name: name.into(),
         dimensions: if is_single_level_world(world) { 2 } else { 3 },
@@ -51,12 +56,51 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
     }
 }
 
-/// Returns the call signs as names of bodies; an airplane without one has no name.
+/// Returns the call signs as names of bodies, and the names of areas; one without a name has none.
 fn body_names(world: &AirspaceWorld) -> Vec<(BodyKind, u32, String)> {
-    (0..)
+    let airplanes = (0..)
         .zip(world.airplanes.iter())
-        .filter_map(|(id, airplane)| Some((kinds::AIRPLANE, id, airplane.callsign.clone()?)))
-        .collect()
+        .filter_map(|(id, airplane)| Some((kinds::AIRPLANE, id, airplane.callsign.clone()?)));
+    let areas = (0..)
+        .zip(world.areas.iter())
+        .filter_map(|(number, area)| Some((kinds::AREA, number, area.name.clone()?)));
+    airplanes.chain(areas).collect()
+}
+
+/// Returns the borders of some areas at a time: on the one level of a flat world, else on their lowest and highest ones.
+fn area_bodies(world: &AirspaceWorld, t_s: f64, is_shown: impl Fn(&Area) -> bool) -> Vec<Body> {
+    let mut bodies = Vec::new();
+    let level_m = world.airplanes.first().map_or(0.0, |airplane| airplane.altitude_m);
+    let is_flat = is_single_level_world(world);
+    let ids = 0..world.airplanes.len() as EntitySlot;
+    let thickness_m = BORDER_FRACTION * ids.map(|id| zone_radius_m(world, id)).fold(0.0, f64::max);
+    for (number, area) in (0..).zip(world.areas.iter()).filter(|(_, area)| is_shown(area)) {
+        let plane = area.plane_at(world.surface, t_s);
+        let ends_m = [area.levels.low_m, area.levels.high_m];
+        let mut levels_m: Vec<f64> =
+            ends_m.into_iter().filter(|level_m| level_m.is_finite() && !is_flat).collect();
+        if levels_m.is_empty() {
+            levels_m.push(level_m);
+        }
+        let mut part = 0;
+        for line in area.shape.outlines() {
+            for &level_m in &levels_m {
+                let on_level = |&in_area: &Point| {
+                    let [x_m, y_m] = world.display_m(plane.to_world(in_area));
+                    [x_m, y_m, level_m]
+                };
+                let points_m = line.iter().map(on_level).collect();
+                let shape = Shape::Line { points_m, thickness_m };
+                let [x_m, y_m] = world.display_m(plane.to_world([0.0; 2]));
+                let pose = Pose::from_position([x_m, y_m, level_m]);
+                let body = Body::new(kinds::AREA, number, pose, shape).with_part(part);
+                let is_fence = area.kind == AreaKind::In;
+                bodies.push(body.with_condition_if(is_fence, BodyCondition::Open));
+                part += 1;
+            }
+        }
+    }
+    bodies
 }
 
 /// Returns the columns of recorded tables that give the positions of airplanes.
@@ -95,7 +139,7 @@ fn zone_shape(world: &AirspaceWorld, slot: EntitySlot) -> Shape {
     Shape::Cylinder { radius_m, height_m: ZONE_HEIGHT_FRACTION * radius_m }
 }
 
-/// Returns the airplanes that are in the air, each followed by its zone.
+/// Returns the airplanes that are in the air, each followed by its zone, and the areas that come and go.
 pub(super) fn visible_bodies(
     world: &AirspaceWorld,
     state: &AirspaceState,
@@ -104,7 +148,10 @@ pub(super) fn visible_bodies(
     let ids = 0..world.airplanes.len() as EntitySlot;
     let active: Vec<EntitySlot> = ids.filter(|&id| state.is_active(world, id, now)).collect();
     let too_near = too_close_aircraft(world, state, &active);
-    active.iter().flat_map(|&id| airplane_and_zone(world, state, id, &too_near)).collect()
+    let airplanes = active.iter().flat_map(|&id| airplane_and_zone(world, state, id, &too_near));
+    let now_s = world.cycle_start_s(now);
+    let is_shown = |area: &Area| !area.is_permanent() && area.lasts_at(now_s);
+    airplanes.chain(area_bodies(world, now_s, is_shown)).collect()
 }
 
 fn airplane_and_zone(
@@ -197,6 +244,12 @@ pub(super) fn to_log_event(event: &Event) -> LogEvent {
         ),
         EventKind::Absent => {
             (Severity::Warning, "stays on its fallback: no control of it came in time".into())
+        }
+        EventKind::AreaEntry => {
+            (Severity::Error, format!("comes to where area/{value} does not permit it to be"))
+        }
+        EventKind::AreaExempt => {
+            (Severity::Warning, format!("is not kept clear of area/{value} by the shield"))
         }
     };
     let airplane = |id| BodyId::new(kinds::AIRPLANE, id, None);

@@ -4,6 +4,7 @@ mod solo_flight;
 #[cfg(test)]
 mod tests;
 
+use super::areas::{AreaContext, Areas, LocalAreas};
 use super::flight::{
     Action, AirplaneStart, Chart, DetourAlternatives, DoneOrders, FlightConditions,
     FlightLevelRange, FlightPhase, Gusts, InterOrderSegment, KnownAircraft, Point, Pose2,
@@ -22,6 +23,9 @@ use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 use std::borrow::Cow;
 use std::sync::Arc;
+
+/// Meters around the reach of an airplane within which areas are considered: more than all margins of plans.
+const AREA_GAP_M: f64 = 10.0;
 
 /// The immutable world, shared by all runs of a scenario.
 #[derive(Debug, Clone)]
@@ -83,6 +87,8 @@ pub struct AirspaceWorld {
     pub wind_m_s: Point,
     /// Gusts beside it, which nobody knows.
     pub gusts: Option<Gusts>,
+    /// The areas to stay out of, or inside of.
+    pub areas: Areas,
     /// Random errors that no airplane knows.
     pub disturbance: Disturbance,
     /// Bounds on those errors for which the shield allows.
@@ -228,11 +234,16 @@ impl AirspaceWorld {
         self.has_common_plans() && self.airplanes[slot as usize].orders.is_empty()
     }
 
+    /// Returns the longest time of a fallback until it orbits, in seconds.
+    fn fallback_lead_s(&self, i: usize) -> f64 {
+        let cycles = self.fallbacks[i].iter().map(|fallback| fallback.cycles_until_orbit()).max();
+        f64::from(cycles.unwrap_or(0)) * self.timing.dt_s
+    }
+
     /// Returns how far an airplane gets within one `dt`, and on a fallback after it, in meters.
     fn fallback_reach_m(&self, i: usize) -> f64 {
-        let cycles = self.fallbacks[i].iter().map(|fallback| fallback.cycles_until_orbit()).max();
-        let lead_s = f64::from(cycles.unwrap_or(0)) * self.timing.dt_s;
         let v_m_s = self.top_m_s[i];
+        let lead_s = self.fallback_lead_s(i);
         v_m_s * (self.timing.dt_s + lead_s) + 2.0 * v_m_s / self.orbit_rad_s[i]
     }
 
@@ -460,11 +471,42 @@ impl AirspaceWorld {
         self.segment(known.slot, known.orders).levels_within(known.altitude_m, look_ahead_s)
     }
 
-    /// Returns where each action would lead an airplane, and the cost of that beside non-cooperative aircraft.
+    /// Returns what is the same for all areas around airplanes in a cycle, for methods that look so far ahead.
+    pub(crate) fn area_context(&self, now: Cycle, look_ahead_s: f64) -> AreaContext<'_> {
+        AreaContext {
+            areas: &self.areas,
+            surface: self.surface,
+            wind_m_s: self.wind_m_s,
+            now_s: self.cycle_start_s(now),
+            look_ahead_s,
+        }
+    }
+
+    /// Returns the same for predictions.
+    fn prediction_areas(&self, now: Cycle) -> AreaContext<'_> {
+        self.area_context(now, self.timing.horizon_s() + self.timing.dtau_s)
+    }
+
+    /// Returns the areas that the plans of an airplane may come to, or its fallback, if all see it in some place.
+    pub(crate) fn areas_around(&self, slot: EntitySlot, at: Point, now: Cycle) -> LocalAreas {
+        // Most scenarios have none.
+        if self.areas.is_empty() || !self.shield {
+            return None;
+        }
+        let i = slot as usize;
+        let turn_s = std::f64::consts::TAU / self.orbit_rad_s[i];
+        let look_ahead_s = self.fallback_lead_s(i) + self.timing.dt_s + turn_s;
+        let reach_m = self.fallback_reach_m(i) + 2.0 * self.error_m(i) + AREA_GAP_M;
+        self.area_context(now, look_ahead_s).near(self.surface.frame_at(at), at, reach_m)
+    }
+
+    /// Returns where each action would lead an airplane, and the cost of that beside non-cooperative aircraft and among
+    /// areas.
     pub(crate) fn action_predictions(
         &self,
         known: KnownAircraft,
         non_cooperative: &[NonCooperativeAircraft],
+        now: Cycle,
     ) -> ActionPredictions {
         let InterOrderSegment { model, mission, .. } = self.segment(known.slot, known.orders);
         let actions = self.present_actions(known);
@@ -473,6 +515,7 @@ impl AirspaceWorld {
         let frame = self.surface.frame_at(known.pose.at);
         ActionPredictions::new(predictions, frame, model.separation_m, self.levels(known))
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)
+            .with_areas(&self.prediction_areas(now), &self.objective, self.timing.dtau_s)
     }
 
     /// Returns the largest number of samples that one optimization may draw from an airplane's

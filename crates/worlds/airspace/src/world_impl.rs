@@ -117,6 +117,12 @@ impl World for AirspaceWorld {
         for (now, a, b) in std::mem::take(&mut scratch.too_close) {
             counters.add_too_close_pair(now, (a, b));
         }
+        for (key, record) in std::mem::take(&mut scratch.areas) {
+            counters.add_area(key, record);
+        }
+        for (now, slot, number) in std::mem::take(&mut scratch.exempt_areas) {
+            counters.add_exempt_area(now, (slot, number));
+        }
         collector.decide_ns += std::mem::take(&mut scratch.decide_ns);
         collector.pending.events.append(&mut scratch.events);
         collector.pending.optimizations.append(&mut scratch.optimizations);

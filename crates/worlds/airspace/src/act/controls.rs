@@ -1,5 +1,6 @@
 //! The controls of a group, stored and carried out.
 
+use super::areas::report_areas_ahead;
 use super::protect::{exempt_non_cooperative, store_maneuver};
 use crate::agents::network_traffic::NetworkTraffic;
 use crate::decide::{OptimizationRecord, joint_action_cost};
@@ -46,6 +47,9 @@ pub(super) fn apply_controls(
             None => Maneuver::Orbit,
         };
         store_maneuver(context, own.id, &maneuver);
+        if world.shield {
+            report_areas_ahead(context, own, &maneuver);
+        }
         let flown = match maneuver {
             Maneuver::Profile { profile, .. } => FlownProfile { profile, fallback: None },
             Maneuver::Orbit => {
@@ -102,7 +106,7 @@ fn record_outcomes(
     if are_all_decided && own.len() <= world.minimum_up_to {
         let group: Vec<KnownAircraft> = own.iter().map(OwnshipState::as_known_aircraft).collect();
         let joint: Vec<usize> = optimized.iter().map(|one| one.chosen as usize).collect();
-        let cost = joint_action_cost(world, &group, non_cooperative, &joint);
+        let cost = joint_action_cost(world, &group, non_cooperative, &joint, now);
         reached = Some(cost.reached);
         minimum = cost.minimum;
     }

@@ -24,7 +24,7 @@ pub(super) fn decide(
     let mut all = find_candidates(context, own, non_cooperative);
     context.scratch.decide_ns += clock.thread_cpu_ns() - start_ns;
     let maneuvers: Vec<Maneuver> = if world.shield {
-        shielded_maneuvers(world, own, non_cooperative, &all)
+        shielded_maneuvers(context, own, non_cooperative, &all)
     } else {
         own.iter().zip(&all).map(|(own, (_, one))| unshielded_maneuver(own, one)).collect()
     };
@@ -52,7 +52,7 @@ fn find_candidates(
         DecisionStrategy::Independent | DecisionStrategy::GroupTooLarge => own
             .iter()
             .map(|own| {
-                candidates_alone(world, own.as_known_aircraft(), own.external_action.as_ref())
+                candidates_alone(world, own.as_known_aircraft(), own.external_action.as_ref(), now)
             })
             .collect(),
         DecisionStrategy::Reactive | DecisionStrategy::Joint => {
@@ -103,12 +103,14 @@ fn unshielded_maneuver(own: &OwnshipState, considered: &ManeuverCandidates) -> M
 
 /// Returns the maneuvers that the shield allows to the airplanes of a group.
 fn shielded_maneuvers(
-    world: &AirspaceWorld,
+    context: &PhaseContext<'_>,
     own: &[OwnshipState],
     non_cooperative: &[NonCooperativeAircraft],
     all: &[(AirplaneControl, ManeuverCandidates)],
 ) -> Vec<Maneuver> {
-    let group: Vec<ShieldedAircraft> = own.iter().map(|own| own.shielded_aircraft(world)).collect();
+    let PhaseContext { world, now, .. } = *context;
+    let group: Vec<ShieldedAircraft> =
+        own.iter().map(|own| own.shielded_aircraft(world, now)).collect();
     let dtau_s = world.timing.dtau_s;
     let mut allowed: Vec<Vec<usize>> = Vec::with_capacity(own.len());
     let mut profiles: Vec<Vec<TurnProfile>> = Vec::with_capacity(own.len());

@@ -83,7 +83,7 @@ fn altitude_beside_non_cooperative(
     let world = context.world;
     let own = OwnshipState { fallback, ..ownship_state(context, slot) };
     let levels = FlightLevelRange::between(own.altitude_m, reach_m);
-    let passing = ShieldedAircraft { levels, ..own.shielded_aircraft(world) };
+    let passing = ShieldedAircraft { levels, ..own.shielded_aircraft(world, context.now) };
     let avoidance = NonCooperativeAvoidance::new(&passing, non_cooperative, world.timing.dtau_s);
     let falling_back = own.fallback_profile(world);
     // It can do nothing here about those whose levels it is on already.

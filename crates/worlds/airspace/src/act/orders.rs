@@ -49,14 +49,15 @@ fn fallback_after_order(
         return Some(current.fallback.get());
     }
     let segment = world.segment(slot, u32::from(current.orders.get()) + 1);
+    let before = shielded_aircraft(context, slot);
     let changed = ShieldedAircraft {
         v_m_s: segment.model.v_m_s,
         omega_max_rad_s: segment.model.omega_max_rad_s,
-        ..shielded_aircraft(context, slot)
+        ..before.clone()
     };
     let others = flown
         .iter()
         .filter(|&&other| other != slot)
         .map(|&other| shielded_aircraft(context, other));
-    safe_fallback(&changed, others)
+    safe_fallback(&changed, &before, others)
 }

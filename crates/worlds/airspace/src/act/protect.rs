@@ -13,7 +13,7 @@ use sidestep_kernel::math::wrap_angle;
 
 /// Returns an airplane as the shield knows it: where all see it.
 pub(super) fn shielded_aircraft(context: &PhaseContext<'_>, slot: EntitySlot) -> ShieldedAircraft {
-    ownship_state(context, slot).shielded_aircraft(context.world)
+    ownship_state(context, slot).shielded_aircraft(context.world, context.now)
 }
 
 /// Exempts an airplane and the non-cooperative ones that could come too near on its path within `dt`, and ends the
@@ -30,7 +30,7 @@ pub(super) fn exempt_non_cooperative(
         return;
     }
     let &mut PhaseContext { world, state, now, ref mut scratch, .. } = context;
-    let aircraft = own.shielded_aircraft(world);
+    let aircraft = own.shielded_aircraft(world, now);
     let avoidance = NonCooperativeAvoidance::new(&aircraft, all, world.timing.dtau_s);
     let threats: Vec<&NonCooperativeAircraft> = avoidance.threats(profile).collect();
     let is_threat = |other: EntitySlot| threats.iter().any(|one| one.slot == other);

@@ -1,6 +1,7 @@
 //! The steps of one `dt`: all airplanes fly, and the results are stored.
 
 use super::approaches;
+use super::areas::record_area_times;
 use super::flight::{AircraftCycleMotion, FlightPathSource, SubStep};
 use crate::events::{Event, EventKind};
 use crate::flight::{ConstantRateLeg, Pose2};
@@ -35,6 +36,7 @@ pub(super) fn fly_sub_steps(
         }
         // Distances are those during the step: the legs of all are known, and nobody has flown yet.
         approaches::record_distances(world, &flights, moment, context.scratch);
+        record_area_times(world, &flights, moment, context.scratch);
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             fly(world, flight, moment);
         }

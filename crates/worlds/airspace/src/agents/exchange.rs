@@ -269,6 +269,7 @@ impl ShieldExchangeAgent {
             dt_s: seen.dt_s,
             exempt: exempt.as_slice().into(),
             rank: *rank,
+            areas: seen.areas.clone(),
         }
     }
 

@@ -3,6 +3,7 @@
 use super::ActionChoice;
 use super::participant::{InvalidMessage, are_valid_coordinates};
 use super::traffic_state::{LastKnownState, StateBeacon, TrafficPicture};
+use crate::areas::{AreaContext, Areas};
 use crate::flight::{
     Action, AircraftModel, FlightConditions, Frame, KnownAircraft, Point, Pose2, Prediction,
     RoutePosition, TurnLimit, actions_at_turn_rate,
@@ -36,6 +37,8 @@ pub struct CommonKnowledge {
     pub streams: Streams,
     /// Non-cooperative airplanes near the group, as all see them.
     pub non_cooperative: Vec<NonCooperativeAircraft>,
+    /// The areas to stay out of, or inside of.
+    pub areas: Areas,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
     /// Factor on the cost of deviations of each of the group, in the order of the ids.
@@ -83,7 +86,20 @@ impl CommonKnowledge {
         let frame = self.air.surface.frame_at(beacon.pose.at);
         ActionPredictions::new(predictions, frame, beacon.separation_m, beacon.levels)
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
+            .with_areas(&self.area_context(), &self.objective, self.air.timing.dtau_s)
             .with_deviation_weight(self.deviation_weights[place])
+    }
+
+    /// Returns what is the same for all areas around the group.
+    pub(super) fn area_context(&self) -> AreaContext<'_> {
+        let FlightConditions { timing, wind_m_s, surface, .. } = self.air;
+        AreaContext {
+            areas: &self.areas,
+            surface,
+            wind_m_s,
+            now_s: self.now as f64 * timing.dt_s,
+            look_ahead_s: timing.horizon_s() + timing.dtau_s,
+        }
     }
 
     /// Returns the frame in which the predictions of the airplane at a place lie: where all see it.

@@ -428,6 +428,7 @@ impl Optimizer for PredictionSharingAgent {
                         &common.objective,
                         common.air.timing.dtau_s,
                     )
+                    .with_areas(&common.area_context(), &common.objective, common.air.timing.dtau_s)
                     .with_deviation_weight(common.deviation_weights[from]);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);

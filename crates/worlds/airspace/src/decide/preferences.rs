@@ -55,6 +55,17 @@ pub(super) fn rank_by_cost(
     order.iter().map(|&k| actions[k]).collect()
 }
 
+/// Returns all actions by rising cost for the airplane alone; of equal ones that which proceeds first.
+pub(super) fn rank_by_own_cost(
+    world: &AirspaceWorld,
+    known: KnownAircraft,
+    costs: &[f64],
+) -> Vec<Action> {
+    let mut order: Vec<usize> = (0..costs.len()).rev().collect();
+    order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+    order.iter().map(|&k| world.actions(known.slot)[k]).collect()
+}
+
 /// Returns the different motions of the next `dt` among some actions, in their order.
 pub(super) fn turn_profiles_from_actions(
     world: &AirspaceWorld,

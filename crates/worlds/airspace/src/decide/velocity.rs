@@ -4,6 +4,7 @@
 //! authors fly it, and not once per `dt`. So the preferred profile of a `dt` is found by flying the group ahead,
 //! step by step, each airplane as the method says.
 
+use super::around_areas::{SteeredAircraft, has_areas_ahead, steer_around_areas};
 use super::local_flight::LocalFlight;
 use super::preferences::{rank_by_turn_difference, turn_profiles_from_actions};
 use crate::baseline::{AircraftState, mvp, orca};
@@ -51,6 +52,8 @@ pub(super) fn profiles_by_velocity(
     let mut ahead = group.to_vec();
     let mut preferred = vec![TurnProfile::default(); group.len()];
     let mut memory = MethodMemory { resolving, draws: custom_method_draws(world, group, now) };
+    let has_areas: Vec<bool> =
+        group.iter().map(|known| has_areas_ahead(world, *known, now)).collect();
     for k in 0..world.timing.points_per_dt() {
         let elapsed_s = k as f64 * world.timing.dtau_s;
         let others: Vec<AircraftState> = non_cooperative
@@ -59,8 +62,13 @@ pub(super) fn profiles_by_velocity(
             .collect();
         let traffic = StepTraffic { now, elapsed_s, group: &ahead, others: &others };
         let steering = decide_steering(world, traffic, &mut memory);
-        for ((known, profile), steering) in ahead.iter_mut().zip(&mut preferred).zip(steering) {
-            profile.omegas_rad_s.push(step(world, known, steering));
+        for (place, mut steering) in steering.into_iter().enumerate() {
+            let known = &mut ahead[place];
+            if has_areas[place] {
+                let aircraft = SteeredAircraft { known: *known, now, elapsed_s };
+                steering = steer_around_areas(world, aircraft, steering);
+            }
+            preferred[place].omegas_rad_s.push(step(world, known, steering));
         }
     }
     group
@@ -68,6 +76,24 @@ pub(super) fn profiles_by_velocity(
         .zip(preferred)
         .map(|(known, profile)| rank_by_similarity(world, *known, profile))
         .collect()
+}
+
+/// Returns the turn profiles of an airplane that avoids nobody in the next `dt`: straight to its way-point, as far as no
+/// area is in the way, and then the others by how little they differ from that.
+pub(super) fn profiles_alone(
+    world: &AirspaceWorld,
+    known: KnownAircraft,
+    now: Cycle,
+) -> Vec<TurnProfile> {
+    let mut ahead = known;
+    let mut preferred = TurnProfile::default();
+    for k in 0..world.timing.points_per_dt() {
+        let elapsed_s = k as f64 * world.timing.dtau_s;
+        let aircraft = SteeredAircraft { known: ahead, now, elapsed_s };
+        let steering = steer_around_areas(world, aircraft, Steering::Proceed);
+        preferred.omegas_rad_s.push(step(world, &mut ahead, steering));
+    }
+    rank_by_similarity(world, known, preferred)
 }
 
 /// Returns the random streams of a group's airplanes, if the method is one of the program's own.

@@ -145,6 +145,11 @@ impl ConstantRateLeg {
             .in_wind(self.drift_m_s)
     }
 
+    /// Returns the position at a time.
+    pub(crate) fn position_at(&self, t_s: f64) -> Point {
+        self.motion(t_s).at
+    }
+
     fn motion(&self, t_s: f64) -> KinematicState {
         let flown_s = t_s - self.from_s;
         let half_turn_rad = 0.5 * self.omega_rad_s * flown_s;

@@ -42,7 +42,7 @@ impl Inspector<'_> {
             return inspection.add_section(section.fact("action", action));
         };
         let actions = self.world.actions(self.id);
-        let options = self.world.action_predictions(*own, &self.trace.non_cooperative);
+        let options = self.world.action_predictions(*own, &self.trace.non_cooperative, self.now);
         let chances = self.probabilities();
         let mut table = FactTable::new(["action", "probability", "expected cost", "chosen"]);
         for (k, action) in actions.iter().enumerate() {
@@ -84,7 +84,8 @@ impl Inspector<'_> {
     fn joint_costs(&self, decided: &ActionChoice) -> JointCosts {
         let InspectionTrace { group, non_cooperative, joint, .. } = &self.trace;
         let joint = joint.as_ref().filter(|joint| joint.len() <= MAX_MINIMUM_AIRPLANES);
-        let known = joint.map(|joint| joint_action_cost(self.world, group, non_cooperative, joint));
+        let known = joint
+            .map(|joint| joint_action_cost(self.world, group, non_cooperative, joint, self.now));
         let reached = known.as_ref().map(|known| known.reached).or(decided.reached);
         JointCosts {
             cost: reached.map(|reached| reached.cost),

@@ -1,7 +1,7 @@
 //! The knowledge with which an airplane goes into a conversation: its perceptions, and the filed flights.
 
 use super::common_plans::CommonPlans;
-use super::percept::{Percept, SurveillanceReport, TrackedState, priority_rank};
+use super::percept::{OwnshipState, Percept, SurveillanceReport, TrackedState, priority_rank};
 use crate::agents::exchange::{ObservedAircraft, ShieldExchangeSetup};
 use crate::agents::traffic_state::{LastKnownState, OrbitState, StateBeacon, TrafficPicture};
 use crate::agents::{CommonKnowledge, FiledFlight, Ownship};
@@ -9,7 +9,7 @@ use crate::flight::{FlightLevelRange, KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{Fallback, OrbitSide, PlanCertainty, ShieldedAircraft};
 use crate::world::AirspaceWorld;
-use sidestep_kernel::{EntityId, math};
+use sidestep_kernel::{Cycle, EntityId, math};
 use std::sync::Arc;
 
 /// Returns the knowledge that all agents of a group share before their conversations. The airplanes nearby that are
@@ -32,6 +32,7 @@ pub(super) fn common_knowledge(
         settings: world.settings,
         streams: world.streams,
         non_cooperative: percept.non_cooperative.iter().cloned().chain(straight).collect(),
+        areas: Arc::clone(&world.areas),
         is_shielded: world.shield,
         deviation_weights: world.deviation_weights(&group),
     })
@@ -132,12 +133,12 @@ pub(super) fn shield_exchange_setup(
     all.sort_unstable_by_key(|(one, ..)| one.id);
     let mut aircraft = Vec::with_capacity(all.len());
     for (one, takes_part, common) in all {
-        let seen = shielded_aircraft_from_report(world, &percept.own.exempt, percept.own.id, one);
+        let seen = shielded_aircraft_from_report(world, percept, one);
         let filed_v_m_s = seen.v_m_s;
         let filed_levels = seen.levels;
         aircraft.push(ObservedAircraft {
             aircraft: if one.id == percept.own.id {
-                percept.own.shielded_aircraft(world)
+                percept.own.shielded_aircraft(world, percept.cycle)
             } else {
                 seen
             },
@@ -164,16 +165,16 @@ pub(super) fn shield_exchange_setup(
     }
 }
 
-/// Returns another airplane as the shield of airplane `own` knows it from its visible state and its filed flight: where
-/// messages get lost, no order changes its speed or its level. `exempt` are those with which `own` is an exempt pair.
+/// Returns another airplane as the shield of one that perceives it knows it from its visible state and its filed flight:
+/// where messages get lost, no order changes its speed or its level.
 fn shielded_aircraft_from_report(
     world: &AirspaceWorld,
-    exempt: &[EntityId],
-    own: EntityId,
+    percept: &Percept,
     one: &SurveillanceReport,
 ) -> ShieldedAircraft {
-    let exempt = exempt.binary_search(&one.id).map_or(Vec::new(), |_| vec![own]);
-    shielded_aircraft_seen(world, one, exempt)
+    let OwnshipState { id, exempt, .. } = &percept.own;
+    let exempt = exempt.binary_search(&one.id).map_or(Vec::new(), |_| vec![*id]);
+    shielded_aircraft_seen(world, percept.cycle, one, exempt)
 }
 
 /// Returns an airplane as all know it who have watched its flight.
@@ -193,11 +194,12 @@ pub(super) fn watched_aircraft(
     exempt.sort_unstable();
     // Nobody sees how often the shield has refused its preferred maneuver.
     let rank = priority_rank(world, &one.as_tracked_aircraft(), 0);
-    ShieldedAircraft { rank, ..shielded_aircraft_seen(world, one, exempt) }
+    ShieldedAircraft { rank, ..shielded_aircraft_seen(world, percept.cycle, one, exempt) }
 }
 
 fn shielded_aircraft_seen(
     world: &AirspaceWorld,
+    now: Cycle,
     one: &SurveillanceReport,
     exempt: Vec<EntityId>,
 ) -> ShieldedAircraft {
@@ -225,6 +227,7 @@ fn shielded_aircraft_seen(
         exempt: exempt.into(),
         // Ranks are known from proposals only.
         rank: 0,
+        areas: world.areas_around(one.id, one.pose.at, now),
     }
 }
 

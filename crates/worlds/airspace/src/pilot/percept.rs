@@ -76,8 +76,8 @@ impl OwnshipState {
         KnownAircraft { slot: id, pose: seen, next: next as usize, orders, altitude_m }
     }
 
-    /// Returns the airplane as the shield knows it: where all see it.
-    pub(crate) fn shielded_aircraft(&self, world: &AirspaceWorld) -> ShieldedAircraft {
+    /// Returns the airplane as the shield knows it in a cycle: where all see it.
+    pub(crate) fn shielded_aircraft(&self, world: &AirspaceWorld, now: Cycle) -> ShieldedAircraft {
         let segment = world.segment(self.id, self.orders);
         ShieldedAircraft {
             id: self.id,
@@ -102,6 +102,7 @@ impl OwnshipState {
                 &KnownAircraft { pose: self.pose, ..self.as_known_aircraft() },
                 self.refusals,
             ),
+            areas: world.areas_around(self.id, self.seen.at, now),
         }
     }
 

@@ -442,7 +442,7 @@ fn allowed_profiles(
     percept: &Percept,
     candidates: &ManeuverCandidates,
 ) -> Vec<usize> {
-    let aircraft = percept.own.shielded_aircraft(world);
+    let aircraft = percept.own.shielded_aircraft(world, percept.cycle);
     let avoidance =
         NonCooperativeAvoidance::new(&aircraft, &percept.non_cooperative, world.timing.dtau_s);
     avoidance.allowed_profiles(&candidates.profiles, || percept.own.fallback_profile(world))

@@ -1,5 +1,6 @@
 //! Compilation of a scenario's sections to an immutable world.
 
+use super::detours::DetourRules;
 use super::start_groups::largest_start_group;
 use super::{AirspaceFile, CompiledAirspace, ParsedScenario, Preset};
 use crate::flight::AirplaneStart;
@@ -11,6 +12,7 @@ use crate::settings::{BuiltInMethod, Deployment, Disturbance, Grouping, Reactive
 use crate::shield::{ErrorBounds, ExemptIds, Fallback, ShieldedAircraft, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
+use sidestep_import::geojson::GeoAreas;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
 use sidestep_scenario::{ByName, SeedEffect, Source, Spanned};
@@ -65,6 +67,11 @@ impl<'a> Compiler<'a> {
         known: &'a AirspaceWorld,
     ) -> Self {
         Self { seed, known: Some(known), ..Self::new(recipe) }
+    }
+
+    /// Returns the content of the file of areas.
+    pub(super) fn areas_of_file(&self) -> Option<&GeoAreas> {
+        self.recipe.areas_file.as_ref()
     }
 
     pub(super) fn compile(&self) -> Result<CompiledAirspace, InputError> {
@@ -123,15 +130,24 @@ impl<'a> Compiler<'a> {
         let streams = Streams::new(Seed(self.seed));
         let timing = self.timing()?;
         let replay = self.replay_period(&timing);
-        let airplanes = self.airplanes(&streams, replay)?;
+        let mut airplanes = self.airplanes(&streams, replay)?;
         let vertical_m = section.vertical_m.map_or(300.0, f64::from) - ROUNDING_M;
         let surface = self.surface()?;
         let origin_deg = self.origin_deg(surface, &airplanes)?;
+        let areas = self.areas(surface)?;
+        let passing = self.waypoint_rule(&airplanes);
+        let detours = DetourRules {
+            surface,
+            areas: &areas,
+            tolerance_m: passing.tolerance_m,
+            error_m: self.error_bounds().position_m,
+        };
+        detours.apply(&mut airplanes);
         let world = AirspaceWorld {
             network: self.network(&timing, &airplanes)?,
             wind_m_s: self.wind_m_s(&airplanes)?,
             gusts: self.gusts(&timing, &airplanes)?,
-            passing: self.waypoint_rule(&airplanes),
+            passing,
             airplanes: Arc::new(airplanes),
             timing,
             objective: self.objective(vertical_m, timing.dtau_s),
@@ -154,6 +170,7 @@ impl<'a> Compiler<'a> {
             curvature_m: 0.0,
             start_utc_s: section.start_utc_s.map(f64::from),
             replay_cycles: replay.cycles,
+            areas,
             disturbance: self.disturbance(),
             bounds: self.error_bounds(),
             fingerprint: self.recipe.fingerprint(self.seed),
@@ -461,6 +478,11 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Fallback>, Vec<(u32, u32)>)
             exempt: ExemptIds::default(),
             rank: rank as u64,
             id: i as u32,
+            areas: world.areas_around(
+                i as u32,
+                observed_pose(world, i as u32, 0, airplane.start).at,
+                0,
+            ),
         });
     }
     let (chosen, pairs) = first_fallbacks(&group);

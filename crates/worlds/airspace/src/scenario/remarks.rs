@@ -2,8 +2,8 @@
 
 use super::CompiledAirspace;
 use super::effectless::effectless_remarks;
-use crate::flight::GRAVITY_M_S2;
-use sidestep_scenario::Remark;
+use crate::flight::{AirplaneStart, FlightLevelRange, GRAVITY_M_S2, Point};
+use sidestep_scenario::{Remark, Severity};
 
 /// Largest acceleration to the side of a turn without a warning, in gravities: 80 degrees of bank. Aerobatic and combat
 /// aircraft pull more for seconds, and not in every turn.
@@ -16,7 +16,10 @@ const USUAL_BANK_TANGENT: f64 = 0.577_350_269_189_625_8;
 pub(crate) fn scenario_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     let mut remarks: Vec<Remark> = turn_remark(compiled).into_iter().collect();
     remarks.extend(missing_type_remarks(compiled));
+    remarks.extend(area_remarks(compiled));
     remarks.extend(effectless_remarks(compiled));
+    // A stable sort, warnings first.
+    remarks.sort_by_key(|remark| remark.severity != Severity::Warning);
     remarks
 }
 
@@ -64,6 +67,60 @@ fn turn_remark(compiled: &CompiledAirspace) -> Option<Remark> {
     Some(Remark::warning("airplane.omega_max_deg_s", words))
 }
 
+/// Returns what an author may not expect of areas: airplanes that start, or have way-points, where an area does not permit
+/// them to be; and what was not taken of a file as it stood.
+fn area_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
+    let world = &*compiled.world;
+    let given = compiled.recipe.file.airspace.areas.len();
+    let mut remarks = Vec::new();
+    for (number, area) in world.areas.iter().enumerate() {
+        let key = if number < given {
+            format!("airspace.areas.{number}")
+        } else {
+            "airspace.areas_file".to_string()
+        };
+        let forbids = |at: Point, airplane: &AirplaneStart| {
+            area.is_on_levels(&FlightLevelRange::from_level(airplane.altitude_m))
+                && area.forbids(area.plane_at(world.surface, area.from_s).to_area(at))
+        };
+        let mut add = |ids: Vec<u32>, words: &str| {
+            let Some(&first) = ids.first() else { return };
+            let name = world.display_name(first);
+            let others = match ids.len() {
+                1 => String::new(),
+                many => format!(" and {} more", many - 1),
+            };
+            let area = area.display_name(number);
+            remarks.push(Remark::warning(
+                key.clone(),
+                format!("{area}: airplane {name}{others} {words}"),
+            ));
+        };
+        let find = |is: &dyn Fn(&AirplaneStart) -> bool| -> Vec<u32> {
+            let cooperative =
+                |airplane: &AirplaneStart| !airplane.is_non_cooperative && is(airplane);
+            (0..)
+                .zip(world.airplanes.iter())
+                .filter(|(_, one)| cooperative(one))
+                .map(|(id, _)| id)
+                .collect()
+        };
+        if area.is_permanent() {
+            let starts = find(&|airplane| forbids(airplane.start.at, airplane));
+            add(
+                starts,
+                "begins where it does not permit it to be, and is exempt until it is clear of it",
+            );
+            let ends = find(&|airplane| airplane.mission.iter().any(|&at| forbids(at, airplane)));
+            add(ends, "has a way-point where it does not permit it to be, and will not get there");
+        }
+    }
+    if let Some(found) = &compiled.recipe.areas_file {
+        remarks.extend(found.report.remarks("airspace.areas_file"));
+    }
+    remarks
+}
+
 /// Returns a number as it is shown: without the digits that a change of units leaves.
 fn round_to_hundredths(number: f64) -> f64 {
     (100.0 * number).round() / 100.0
@@ -72,7 +129,7 @@ fn round_to_hundredths(number: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_scenario::{Severity, Source};
+    use sidestep_scenario::Source;
 
     fn remarks(airplane: &str) -> Vec<Remark> {
         let text = format!(

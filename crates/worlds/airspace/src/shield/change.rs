@@ -31,7 +31,8 @@ pub(crate) fn entry_fallbacks(
         group[i].do_fallbacks_stay_apart(of_i, &group[j], of_j)
     };
     let count_conflicts = |chosen: &[Fallback], i: usize, fallback: Fallback| {
-        near[i].iter().filter(|&&j| !stay_apart((i, fallback), (j, chosen[j]))).count()
+        let too_close = near[i].iter().filter(|&&j| !stay_apart((i, fallback), (j, chosen[j])));
+        too_close.count() + group[i].area_conflicts(fallback)
     };
     // An airplane with fewer conflicts on another fallback changes over. Conflicts only decrease, so this
     // ends.
@@ -65,15 +66,19 @@ pub(crate) fn entry_fallbacks(
 }
 
 /// Returns the fallback out of `choices` with which an airplane that is about to fly as `changed` is apart from
-/// the stored fallbacks of others, if there is one; preferably the stored one.
+/// the stored fallbacks of others, and as clear of areas as `before`, if there is one; preferably the stored one.
 pub(crate) fn safe_fallback(
     changed: &ShieldedAircraft,
+    before: &ShieldedAircraft,
     others: impl Iterator<Item = ShieldedAircraft>,
 ) -> Option<Fallback> {
     let others: Vec<ShieldedAircraft> =
         others.filter(|other| changed.is_protected_from(other)).collect();
     stored_first(changed).find(|&fallback| {
-        others.iter().all(|other| changed.do_fallbacks_stay_apart(fallback, other, other.fallback))
+        changed.is_as_clear_as(fallback, before)
+            && others
+                .iter()
+                .all(|other| changed.do_fallbacks_stay_apart(fallback, other, other.fallback))
     })
 }
 
@@ -110,6 +115,18 @@ pub(crate) fn next_altitude(
     // `None` where it would lose the fallback that keeps it apart from those on its own level.
     let altitude_m = |fallback: Fallback| {
         let mut free_m = limit_m(fallback);
+        for area in passing.areas_on_levels() {
+            let is_met_now = area.is_on_levels(&changing.levels);
+            // By the invariant; and where it is exempt, a change of level brings it no nearer.
+            let is_kept_clear = is_met_now && fallback == changing.fallback;
+            if is_kept_clear || passing.is_fallback_clear(fallback, area) {
+                continue;
+            }
+            if is_met_now {
+                return None;
+            }
+            free_m = altitude_short_of(area.levels(), 0.0, from_m, free_m);
+        }
         for &other in &met {
             let is_met_now = changing.is_protected_from(other);
             // By the invariant; with errors of position the two need not be seen apart anew.

@@ -1,6 +1,7 @@
 //! Fallbacks: paths that an airplane can fly forever, and a test of whether two of them stay apart.
 
 use super::orbit::{Orbit, OrbitSide, stays_apart_for};
+use crate::areas::PathPiece;
 use crate::flight::{AircraftModel, PairPlane, Point, Pose2, RigidMotion};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
@@ -223,6 +224,24 @@ impl FallbackPath {
     /// Returns the time until the orbit begins, in seconds.
     pub(crate) fn lead_s(&self) -> f64 {
         self.lead_s
+    }
+
+    /// Returns its pieces, of which the first begins `after_s` seconds from now.
+    pub(super) fn pieces(&self, after_s: f64) -> [PathPiece; 3] {
+        let Self { start, v_m_s, turn_rad_s, turn_s, turn_end, lead_s, .. } = *self;
+        let piece = |start: Pose2, omega_rad_s: f64, from_s: f64, until_s: f64| PathPiece {
+            start,
+            v_m_s,
+            omega_rad_s,
+            from_s: after_s + from_s,
+            until_s: after_s + until_s,
+        };
+        let orbit_start = turn_end.step(v_m_s, 0.0, lead_s - turn_s);
+        [
+            piece(start, turn_rad_s, 0.0, turn_s),
+            piece(turn_end, 0.0, turn_s, lead_s),
+            piece(orbit_start, self.orbit.omega_rad_s(), lead_s, f64::INFINITY),
+        ]
     }
 
     /// Returns the position on it after some seconds.

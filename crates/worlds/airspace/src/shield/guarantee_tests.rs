@@ -10,12 +10,12 @@ use std::collections::BTreeSet;
 /// Number of cases of the long tests.
 const MANY: u32 = 10_000;
 
-fn run(airspace: &str, airplanes: &str) -> AirspaceRun {
+pub(crate) fn run(airspace: &str, airplanes: &str) -> AirspaceRun {
     let text = format!("format = 1\nworld = \"airspace\"\n[airspace]\n{airspace}\n{airplanes}");
     airspace_run(&Source::new("promise", text, ""), 1).expect("a scenario")
 }
 
-fn plane(at: [f64; 2], heading_deg: f64, goal: [f64; 2], more: &str) -> String {
+pub(crate) fn plane(at: [f64; 2], heading_deg: f64, goal: [f64; 2], more: &str) -> String {
     format!(
         "[[airplanes]]\nat_m = {at:?}\nheading_deg = {heading_deg:?}\nway_points_m = [{goal:?}]\n{more}\n"
     )
@@ -77,7 +77,7 @@ fn orders() -> impl Strategy<Value = String> {
 }
 
 /// Airplanes on three levels, some of them in pairs that start or come in too close, with orders.
-fn crowd() -> impl Strategy<Value = String> {
+pub(crate) fn crowd() -> impl Strategy<Value = String> {
     let coordinate = || -4000.0f64..4000.0;
     let one = (
         [coordinate(), coordinate(), coordinate(), coordinate()],
@@ -116,7 +116,7 @@ fn only_named_pairs_lose(airspace: &str, airplanes: &str) -> Result<(), TestCase
 }
 
 /// Random traffic with errors: of places in meters, and of headings in degrees (standard deviations).
-fn erring(sigma_m: f64, sigma_deg: f64, more: &str) -> String {
+pub(crate) fn erring(sigma_m: f64, sigma_deg: f64, more: &str) -> String {
     format!(
         "position_noise_m = {sigma_m:?}\nheading_noise_deg = {sigma_deg:?}\nmethod = \"none\"\n{more}"
     )

@@ -38,11 +38,15 @@
 //!    those that it meets anew its fallback has to be apart, and those that it has met already are apart by the
 //!    invariant, or because they were cleared with regard to it.
 //!
+//! 7. *Areas.* Of each candidate only those fallbacks are left after which the plan keeps clear of areas, before any plans
+//!    are compared (`areas.rs`); the stored fallback always is. So the search ends as before, and stored fallbacks stay
+//!    clear.
+//!
 //! By induction over `dt` no pair that is not exempt ever loses separation. In a plane, a wind that all know
 //! moves all alike and changes no distance. On the earth each pair is compared in a plane of its own, and
 //! `curvature.rs` has the margin for what that leaves. `errors.rs` has the margin that errors of position and
 //! heading add to `R`, and `avoid.rs` the guarantee beside non-cooperative aircraft. Each step is
-//! a property test in `tests.rs`, the whole one in `guarantee_tests.rs`.
+//! a property test in `tests.rs`, the whole one in `guarantee_tests.rs`, and among areas in `area_tests.rs`.
 //!
 //! Airplanes that turn at different rates orbit at one rate, which all can fly (`common_orbit_rates`).
 //! Then plans of airplanes that pass each other are nearly always compatible, and the shield costs
@@ -53,6 +57,9 @@
 //! Numbers: `orbit.rs` and `fallback.rs` never wrongly find that motions stay apart. New plans must keep slightly
 //! more than `R` (by `MARGIN_M`), so that rounding never adds up to a loss.
 
+#[cfg(test)]
+mod area_tests;
+mod areas;
 mod change;
 mod curvature;
 #[cfg(test)]

@@ -112,6 +112,11 @@ impl Orbit {
         self.center
     }
 
+    /// Returns its turn rate in radians per second, positive to the left.
+    pub(super) fn omega_rad_s(&self) -> f64 {
+        self.omega_rad_s
+    }
+
     fn speed_m_s(&self) -> f64 {
         self.radius_m * self.omega_rad_s.abs()
     }

@@ -3,6 +3,7 @@
 use super::fallback::{Fallback, FallbackPath};
 use super::orbit::stays_apart_for;
 use super::shielded_aircraft::ShieldedAircraft;
+use crate::areas::{PathPiece, profile_pieces};
 use crate::flight::{Frame, PairPlane, Point, Pose2, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::interrupt;
@@ -207,6 +208,19 @@ impl SafeManeuver {
             let [orbit_center, center] = plane.points(orbit.center(), center);
             are_poses_clear && distance_m(orbit_center, center) >= orbit.radius_m + gap_m
         })
+    }
+
+    /// Returns the pieces of its motion in `dt`.
+    pub(super) fn motion_pieces(&self) -> Vec<PathPiece> {
+        let ProfileMotion { aircraft, poses, omegas_rad_s, dtau_s } = &*self.motion;
+        profile_pieces(poses[0], aircraft.v_m_s, omegas_rad_s, *dtau_s)
+    }
+
+    /// Returns the pieces of its path, the last of which goes on forever.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = PathPiece> {
+        let ProfileMotion { omegas_rad_s, dtau_s, .. } = &*self.motion;
+        let motion_s = omegas_rad_s.len() as f64 * dtau_s;
+        self.motion_pieces().into_iter().chain(self.path.pieces(motion_s))
     }
 
     /// Returns the number of the candidate, if it is one.

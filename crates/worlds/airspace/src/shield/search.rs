@@ -1,5 +1,6 @@
 //! The search for plans that are pairwise compatible.
 
+use super::areas::ClearFallbacks;
 use super::fallback::Fallback;
 use super::neighbors::neighbors;
 use super::safe_maneuver::{CommonPlan, PlanSource, SafeManeuver, TurnProfile};
@@ -34,6 +35,13 @@ pub enum PlanEnding {
     AnyFallback,
     /// Orbits at once, because others may have to guess it.
     Orbit,
+}
+
+impl PlanEnding {
+    /// Returns whether a plan may end with a fallback.
+    fn allows(self, fallback: Fallback) -> bool {
+        self == Self::AnyFallback || fallback.is_orbiting()
+    }
 }
 
 /// What plans consist of, the same for all airplanes.
@@ -98,12 +106,49 @@ struct ShieldSearch<'a> {
     fallbacks: Vec<SafeManeuver>,
     /// The plans that all compute, of those that have one.
     common: Vec<Option<SafeManeuver>>,
+    /// The candidates of each airplane beside areas; none for those that have none around them.
+    beside_areas: Vec<Option<CandidatesBesideAreas>>,
     /// Airplanes by rising rank.
     by_rank: Vec<usize>,
     /// Those with which a plan of each airplane may be incompatible.
     near: Vec<Vec<usize>>,
     /// Whether two plans are compatible, as far as it was asked; only looked up, never iterated.
     answers: RefCell<FxHashMap<[PlanKey; 2], bool>>,
+}
+
+/// What an airplane may fly beside areas.
+struct CandidatesBesideAreas {
+    /// The candidates with plans that it may fly: first those that are clear of all areas, each kind in the order of
+    /// preference.
+    order: Vec<usize>,
+    /// The fallbacks of these plans, by candidate.
+    clear: Vec<ClearFallbacks>,
+}
+
+impl CandidatesBesideAreas {
+    /// Returns the plans that an airplane may fly; none where there are no areas around it.
+    fn new(
+        aircraft: &ShieldedAircraft,
+        profiles: &[TurnProfile],
+        rules: PlanRules,
+    ) -> Option<Self> {
+        if !aircraft.has_areas() {
+            return None;
+        }
+        let mut clear = Vec::with_capacity(profiles.len());
+        for profile in profiles {
+            let plan =
+                SafeManeuver::new(aircraft.clone(), profile, rules.dtau_s, aircraft.fallback);
+            let mut found = aircraft.clear_fallbacks(&plan);
+            found.fallbacks.retain(|fallback| rules.ending.allows(*fallback));
+            clear.push(found);
+        }
+        let mut order: Vec<usize> =
+            (0..clear.len()).filter(|&k| !clear[k].fallbacks.is_empty()).collect();
+        // A stable sort.
+        order.sort_by_key(|&k| !clear[k].is_clear);
+        Some(Self { order, clear })
+    }
 }
 
 /// A plan among those of a group.
@@ -137,32 +182,59 @@ impl<'a> ShieldSearch<'a> {
             .zip(common)
             .map(|(aircraft, common)| Some(common.as_ref()?.to_maneuver(aircraft.clone(), dtau_s)))
             .collect();
-        let mut plans: Vec<SafeManeuver> = common
+        let plans: Vec<SafeManeuver> = common
             .iter()
             .zip(&fallbacks)
             .map(|(common, fallback)| common.as_ref().unwrap_or(fallback).clone())
             .collect();
-        for ((aircraft, profiles), plan) in group.iter().zip(candidates).zip(&mut plans) {
-            if let Some(first) = profiles.first() {
-                let stored = rules.stored_fallback(aircraft);
-                let source = PlanSource::Candidate(0);
-                *plan = SafeManeuver::from_source(aircraft.clone(), first, dtau_s, source, stored);
-            }
-        }
+        let beside_areas = group
+            .iter()
+            .zip(candidates)
+            .map(|(aircraft, profiles)| CandidatesBesideAreas::new(aircraft, profiles, rules))
+            .collect();
         let mut by_rank: Vec<usize> = (0..group.len()).collect();
         by_rank.sort_unstable_by_key(|&i| group[i].rank);
         let near = neighbors(group, ShieldedAircraft::plan_reach_m);
-        Self {
+        let mut search = Self {
             group,
             candidates,
             rules,
             plans,
             fallbacks,
             common,
+            beside_areas,
             by_rank,
             near,
             answers: RefCell::default(),
+        };
+        for i in 0..group.len() {
+            let first = search.candidate_numbers(i).next();
+            if let Some(first) = first {
+                search.plans[i] = search.candidate(i, first);
+            }
         }
+        search
+    }
+
+    /// Returns the numbers of the candidates of an airplane, the one that it flies most readily first.
+    fn candidate_numbers(&self, i: usize) -> impl DoubleEndedIterator<Item = usize> + use<'_> {
+        let beside_areas = self.beside_areas[i].as_ref().map(|one| &one.order[..]);
+        let all = 0..if beside_areas.is_some() { 0 } else { self.candidates[i].len() };
+        beside_areas.unwrap_or_default().iter().copied().chain(all)
+    }
+
+    /// Returns the fallbacks that a plan of an airplane may end with, in the order in which they are tried.
+    fn fallback_choices(
+        &self,
+        i: usize,
+        plan: &SafeManeuver,
+    ) -> impl Iterator<Item = Fallback> + use<'_, 'a> {
+        let all = match (&self.beside_areas[i], plan.candidate()) {
+            (Some(beside_areas), Some(k)) => &beside_areas.clear[k].fallbacks[..],
+            _ => &self.group[i].choices,
+        };
+        let ending = self.rules.ending;
+        all.iter().copied().filter(move |fallback| ending.allows(*fallback))
     }
 
     /// Returns whether a plan of airplane `i` is compatible with everything that `j` may fly.
@@ -190,13 +262,6 @@ impl<'a> ShieldSearch<'a> {
                     && self.settled_plans(i).all(|settled| settled.is_compatible(other))));
         self.answers.borrow_mut().insert(asked, answer);
         answer
-    }
-
-    /// Returns the fallbacks with which the plans of an airplane may end, in the order in which they are tried.
-    fn choices(&self, i: usize) -> impl Iterator<Item = Fallback> + use<'a> {
-        let ending = self.rules.ending;
-        let all = self.group[i].choices.iter().copied();
-        all.filter(move |fallback| ending == PlanEnding::AnyFallback || fallback.is_orbiting())
     }
 
     /// Returns what an airplane may fly without the consent of others.
@@ -251,7 +316,7 @@ impl<'a> ShieldSearch<'a> {
 
     /// Returns a plan with another fallback, with which it is compatible with all present plans.
     fn with_own_fallback(&self, i: usize, plan: &SafeManeuver) -> Option<PlanChanges> {
-        self.choices(i).find_map(|fallback| {
+        self.fallback_choices(i, plan).find_map(|fallback| {
             let plan = plan.with_fallback(fallback);
             self.is_compatible_with_all(i, &plan).then(|| [(i, plan)].into())
         })
@@ -263,7 +328,7 @@ impl<'a> ShieldSearch<'a> {
     /// Two that pass each other have to turn to the same side: to the one on which they part. If
     /// they are set to the other side, neither of them can change alone.
     fn with_other_fallbacks(&self, i: usize, plan: &SafeManeuver) -> Option<PlanChanges> {
-        self.choices(i).find_map(|fallback| {
+        self.fallback_choices(i, plan).find_map(|fallback| {
             let mut changes: PlanChanges = [(i, plan.with_fallback(fallback))].into();
             let in_the_way: Vec<usize> = self.near[i]
                 .iter()
@@ -284,7 +349,7 @@ impl<'a> ShieldSearch<'a> {
     /// Returns the present plan of an airplane with another fallback, with which it is compatible with all, once others
     /// have changed theirs.
     fn fallback_beside(&self, j: usize, changes: &PlanChanges) -> Option<SafeManeuver> {
-        self.choices(j).find_map(|fallback| {
+        self.fallback_choices(j, &self.plans[j]).find_map(|fallback| {
             let plan = self.plans[j].with_fallback(fallback);
             let is_compatible_with_all = self.near[j].iter().all(|&k| {
                 let other = changes.get(&k).unwrap_or(&self.plans[k]);
@@ -307,13 +372,16 @@ impl<'a> ShieldSearch<'a> {
 
     /// Returns the first plan of an airplane that is compatible with all present ones.
     fn alternative_plan(&self, i: usize) -> Option<PlanChanges> {
-        (0..self.candidates[i].len()).find_map(|k| self.with_own_fallback(i, &self.candidate(i, k)))
+        self.candidate_numbers(i).find_map(|k| self.with_own_fallback(i, &self.candidate(i, k)))
     }
 
-    /// Returns the plan of an airplane with a candidate, and the stored fallback after it.
+    /// Returns the plan of an airplane with a candidate, and the stored fallback after it, or beside areas one that is
+    /// clear of them.
     fn candidate(&self, i: usize, k: usize) -> SafeManeuver {
         let aircraft = self.group[i].clone();
-        let stored = self.rules.stored_fallback(&aircraft);
+        let clear = self.beside_areas[i].as_ref().map(|beside_areas| &beside_areas.clear[k]);
+        let stored =
+            clear.map_or_else(|| self.rules.stored_fallback(&aircraft), |clear| clear.fallbacks[0]);
         let profile = &self.candidates[i][k];
         let source = PlanSource::Candidate(k);
         SafeManeuver::from_source(aircraft, profile, self.rules.dtau_s, source, stored)
@@ -341,7 +409,9 @@ impl<'a> ShieldSearch<'a> {
 
     /// Returns a plan with a candidate that an airplane prefers to that of its present plan.
     fn better_plan(&self, i: usize) -> Option<PlanChanges> {
-        let present = self.plans[i].candidate().unwrap_or(self.candidates[i].len());
-        (0..present).find_map(|k| self.with_other_fallbacks(i, &self.candidate(i, k)))
+        let present = self.plans[i].candidate();
+        self.candidate_numbers(i)
+            .take_while(|&k| Some(k) != present)
+            .find_map(|k| self.with_other_fallbacks(i, &self.candidate(i, k)))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::fallback::{Fallback, FallbackPath};
 use super::orbit::{Orbit, OrbitSide};
+use crate::areas::LocalAreas;
 use crate::flight::{FlightLevelRange, Frame, PairPlane, Point, Pose2, Surface, distance_m};
 use sidestep_kernel::EntityId;
 use std::sync::Arc;
@@ -49,6 +50,8 @@ pub struct ShieldedAircraft {
     pub exempt: Arc<[EntityId]>,
     /// Rank, unique; airplanes of higher rank keep their preferred plans.
     pub rank: u64,
+    /// The areas that it may come to, on whatever levels, in its frame.
+    pub(crate) areas: LocalAreas,
 }
 
 impl ShieldedAircraft {

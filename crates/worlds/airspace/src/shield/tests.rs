@@ -46,6 +46,7 @@ fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
         dt_s: DTAU_S * STEPS as f64,
         exempt: ExemptIds::default(),
         rank,
+        areas: None,
     }
 }
 
@@ -270,7 +271,8 @@ fn a_change_is_refused_when_no_fallback_is_apart() {
     let other = ShieldedAircraft { orbit_rad_s: quick_turns, ..aircraft(1500.0, -100.0, 0.0, 0) };
     let slow = ShieldedAircraft { choices: choices(0.0), ..aircraft(0.0, 0.0, 0.0, 1) };
     let left = Fallback::from_side(OrbitSide::Left);
-    let beside = |changed: &ShieldedAircraft| safe_fallback(changed, [other.clone()].into_iter());
+    let beside =
+        |changed: &ShieldedAircraft| safe_fallback(changed, changed, [other.clone()].into_iter());
     let fast = ShieldedAircraft { v_m_s: 150.0, ..slow.clone() };
     assert_eq!((beside(&slow), beside(&fast)), (Some(left), None));
     let above = ShieldedAircraft { levels: FlightLevelRange::from_level(1000.0), ..fast.clone() };

@@ -63,8 +63,12 @@ impl Pilot {
             let event = Event::new(state.percept.cycle, EventKind::GroupTooLarge, self.id);
             state.control.events.push(event.with_value(members as f64));
         }
-        let considered =
-            candidates_alone(&self.world, own.as_known_aircraft(), own.external_action.as_ref());
+        let considered = candidates_alone(
+            &self.world,
+            own.as_known_aircraft(),
+            own.external_action.as_ref(),
+            state.percept.cycle,
+        );
         self.set_candidates(considered);
     }
 
@@ -187,7 +191,7 @@ impl Pilot {
                 continue;
             };
             let known = one.with_intent(intent);
-            let predictions = world.action_predictions(known, &own.common.non_cooperative);
+            let predictions = world.action_predictions(known, &own.common.non_cooperative, now);
             options.push(predictions.with_deviation_weight(own.common.deviation_weights[place]));
             if world.network.is_some() && one.id != self.id {
                 record_beacon(&mut self.memory.contacts, one.id, beacon(world, known), now);
