@@ -1,11 +1,11 @@
 //! Detours: the shortest route from one place to another that keeps clear of areas.
 //!
 //! The shortest way around polygons leads along straight lines from corner to corner, past corners that jut out into the
-//! free space (the visibility graph of Lozano-Perez and Wesley, 1979). Corners are moved outward, so that an airplane can
+//! free space (the visibility graph of Lozano-Pérez and Wesley, 1979). Corners are moved outward, so that an airplane can
 //! fly around them. Only areas that a route crosses are looked at, and then those that the new route crosses, until none
 //! is left; lines between corners are compared with the borders when the search comes to them (A*).
 
-use super::shape::{AreaShape, Edge, edge_distance_m, edge_to_circle_line_m};
+use super::shape::{AreaShape, Edge, edge_distance_m, edge_to_circle_line_m, square_to_edge_m2};
 use super::{Area, AreaKind, AreaPlane};
 use crate::flight::{Frame, Point, Surface, distance_m};
 use sidestep_kernel::geometry::{add_scaled, normalized, scaled, sub};
@@ -49,28 +49,42 @@ impl DetourPlanner<'_> {
     pub(crate) fn way_points(&self, from: Point, to: Point) -> Vec<Point> {
         let frame = self.surface.frame_at(from);
         let ends = [from, to].map(|at| frame.to_local(at));
-        let all: Vec<LegArea<'_>> =
-            self.areas.iter().map(|area| LegArea::new(area, self.surface, frame)).collect();
-        let mut is_known = vec![false; all.len()];
+        // An area that forbids an end of the leg is left or entered on the straight way.
+        let forbids_end = |area: &Area| {
+            let plane = area.plane_at(self.surface, area.from_s);
+            [from, to].into_iter().any(|end| area.forbids(plane.to_area(end)))
+        };
+        let mut others: Vec<(&Area, Point)> = self
+            .areas
+            .iter()
+            .filter(|area| !forbids_end(area))
+            .map(|&area| (area, frame.to_local(area.center)))
+            .collect();
+        let mut crossed: Vec<LegArea<'_>> = Vec::new();
         let mut route = ends.to_vec();
         loop {
-            let crossed: Vec<usize> = (0..all.len())
-                .filter(|&k| !is_known[k])
-                .filter(|&k| {
-                    route.windows(2).any(|line| !self.is_free(&all[k], [line[0], line[1]], ends))
-                })
-                .collect();
-            if crossed.is_empty() {
+            let before = crossed.len();
+            others.retain(|&(area, center)| {
+                let is_far = |line: &[Point]| {
+                    let from_line_m = square_to_edge_m2(center, [line[0], line[1]]).sqrt();
+                    area.kind == AreaKind::Out
+                        && from_line_m > 1.01 * area.shape.radius_m() + self.gap_m
+                };
+                if route.windows(2).all(is_far) {
+                    return true;
+                }
+                let one = LegArea::new(area, self.surface, frame);
+                let is_free = |line: &[Point]| self.is_free(&one, [line[0], line[1]], ends);
+                if route.windows(2).all(is_free) {
+                    return true;
+                }
+                crossed.push(one);
+                false
+            });
+            if crossed.len() == before {
                 break;
             }
-            crossed.into_iter().for_each(|k| is_known[k] = true);
-            let known: Vec<&LegArea<'_>> = all
-                .iter()
-                .zip(&is_known)
-                .filter(|(_, is_known)| **is_known)
-                .map(|(one, _)| one)
-                .collect();
-            match self.shortest_route(&known, ends) {
+            match self.shortest_route(&crossed, ends) {
                 Some(found) => route = found,
                 None => return Vec::new(),
             }
@@ -92,7 +106,7 @@ impl DetourPlanner<'_> {
     }
 
     /// Returns the shortest route between the ends of a leg past corners of some areas, with the ends.
-    fn shortest_route(&self, areas: &[&LegArea<'_>], ends: Edge) -> Option<Vec<Point>> {
+    fn shortest_route(&self, areas: &[LegArea<'_>], ends: Edge) -> Option<Vec<Point>> {
         let mut places = ends.to_vec();
         for one in areas {
             let corners = one.corners(self.gap_m);
@@ -105,10 +119,6 @@ impl DetourPlanner<'_> {
             places.extend(corners.into_iter().filter(is_free));
         }
         if places.len() > MAX_CORNERS {
-            return None;
-        }
-        // An end in an area cannot be reached, and is left or entered on the straight way.
-        if areas.iter().any(|one| ends.iter().any(|&end| one.forbids(end))) {
             return None;
         }
         let is_free = |line: Edge| areas.iter().all(|one| self.is_free(one, line, ends));

@@ -89,9 +89,12 @@ impl AreaContext<'_> {
         let from_s = (area.from_s - self.now_s).max(0.0);
         let drift_m_s = [area.velocity_m_s, self.wind_m_s].map(|[x, y]| math::hypot(x, y));
         let moves_m = (drift_m_s[0] + drift_m_s[1]) * self.look_ahead_s;
+        let range_m = reach_m + moves_m;
+        if area.is_surely_far(self.surface, at, self.now_s, range_m) {
+            return None;
+        }
         let plane = area.plane_at(self.surface, self.now_s);
         let in_area = plane.to_area(at);
-        let range_m = reach_m + moves_m;
         if area.min_clearance_m(in_area) > range_m || area.clearance_m(in_area) > range_m {
             return None;
         }

@@ -18,7 +18,7 @@ mod shape;
 #[cfg(test)]
 mod tests;
 
-use crate::flight::{FlightLevelRange, Frame, Point, Surface};
+use crate::flight::{FlightLevelRange, Frame, Point, Surface, distance_m};
 pub(crate) use detour::DetourPlanner;
 pub(crate) use local::{AreaContext, LocalArea, LocalAreas};
 pub(crate) use path::{PathPiece, TOLERANCE_M as AREA_TOLERANCE_M, profile_pieces};
@@ -27,6 +27,7 @@ use serde::{Deserialize, Serialize};
 pub use shape::AreaShape;
 pub(crate) use shape::find_crossing;
 use sidestep_kernel::geometry::{add_scaled, sub};
+use sidestep_kernel::math;
 use std::sync::Arc;
 
 /// What airplanes have to do about an area.
@@ -120,6 +121,25 @@ impl Area {
             AreaKind::Out => self.shape.min_outside_m(in_area),
             AreaKind::In => f64::NEG_INFINITY,
         }
+    }
+
+    /// Returns whether it is farther from a place than a limit at a time, as far as that is cheap to find out: most areas of
+    /// a country are.
+    pub(crate) fn is_surely_far(
+        &self,
+        surface: Surface,
+        at: Point,
+        t_s: f64,
+        limit_m: f64,
+    ) -> bool {
+        let [vx, vy] = self.velocity_m_s;
+        let moved_m = math::hypot(vx, vy) * (t_s - self.from_s).max(0.0);
+        let range_m = limit_m + moved_m + self.shape.radius_m();
+        let is_far = match surface {
+            Surface::Plane => distance_m(at, self.center) > range_m,
+            Surface::Earth => surface.is_surely_beyond(at, self.center, range_m),
+        };
+        self.kind == AreaKind::Out && is_far
     }
 
     /// Returns whether some level of an airplane is one of its own.

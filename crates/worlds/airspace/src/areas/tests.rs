@@ -1,9 +1,8 @@
 //! Areas in a plane, and paths beside them.
 
 use super::*;
-use crate::flight::{Pose2, distance_m};
+use crate::flight::Pose2;
 use proptest::prelude::*;
-use sidestep_kernel::math;
 
 /// A polygon with corners at several distances around its center: it may be concave.
 pub(crate) fn some_star() -> impl Strategy<Value = AreaShape> {

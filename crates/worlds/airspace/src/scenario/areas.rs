@@ -21,6 +21,9 @@ const MAX_AREAS: usize = 10_000;
 const MAX_CORNERS: usize = 100_000;
 /// Largest distance in meters of a corner from the center of an area on the earth: beyond it no plane is like the earth.
 const MAX_EARTH_RADIUS_M: f64 = 1e6;
+/// Largest radius of a circle on the earth in meters: beyond it, its border near an airplane is no longer an arc in the
+/// plane there.
+const MAX_EARTH_CIRCLE_M: f64 = 100_000.0;
 /// Length in meters of the pieces into which edges on the earth are divided, so that each piece of a shortest path is
 /// straight in all planes near it to within centimeters.
 const EARTH_PIECE_M: f64 = 5_000.0;
@@ -312,6 +315,12 @@ pub(super) fn shape_of_outline(
     surface: Surface,
 ) -> Result<(AreaShape, Point), OutlineError> {
     let rings = match outline {
+        Outline::Circle { radius_m, .. }
+            if surface == Surface::Earth && radius_m > MAX_EARTH_CIRCLE_M =>
+        {
+            let cause = format!("a circle of {:.0} km on the earth", 1e-3 * radius_m);
+            return Err(OutlineError::new(cause, "give at most 100 km, or a polygon"));
+        }
         Outline::Circle { center, radius_m } => {
             return Ok((AreaShape::Circle { radius_m }, center));
         }
