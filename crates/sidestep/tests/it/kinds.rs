@@ -16,6 +16,7 @@ fn the_kinds_of_all_worlds_have_the_order_of_recorded_files() {
         "obstacle",
         "goal",
         "start",
+        "area",
     ];
     assert_eq!(WORLDS.kinds().names(), names);
 }

@@ -95,6 +95,7 @@ pub(super) fn prepare_decisions(
 ) -> CooperativeGroup {
     // Nearness is that at the time when the group was formed, because orders change levels.
     let flown = CooperativeGroup::from_group(context, group);
+    areas::pass_detours(context, &flown.ids);
     levels::keep_levels(context, group);
     if context.world.shield {
         entry::release_exempt(context, &flown.ids);

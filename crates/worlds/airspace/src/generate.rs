@@ -58,6 +58,7 @@ fn airplane(params: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airpla
         performance: params.performance.clone(),
         start: Pose2 { at: from, heading_rad },
         mission: to,
+        detours: Vec::new(),
         altitude_m: 0.0,
         appears_s: 0.0,
         leaves_s: f64::INFINITY,

@@ -10,6 +10,7 @@ use crate::pilot::{Maneuver, OwnshipState};
 use crate::scratch::{PhaseContext, Scratch};
 use crate::shield::SafeManeuver;
 use crate::world::AirspaceWorld;
+use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::{EntitySlot, math};
 
 /// Length in seconds below which a time in an area is no longer halved: the time of an entry is as exact as that.
@@ -18,6 +19,32 @@ const MIN_INTERVAL_S: f64 = 1e-3;
 const ROUNDING_M: f64 = 1e-6;
 /// Fraction of a step below which two times count as the same.
 const ROUNDING: f64 = 1e-6;
+
+/// Lets airplanes of a group go on that have a way-point behind them, however far away, which only leads around areas:
+/// nobody has to be there, and one that others have pushed past it would fly back.
+pub(super) fn pass_detours(context: &PhaseContext<'_>, group: &[EntitySlot]) {
+    let PhaseContext { world, state, .. } = *context;
+    for &slot in group {
+        let airplane = &world.airplanes[slot as usize];
+        if airplane.detours.is_empty() {
+            continue;
+        }
+        let current = &state.airplanes[slot as usize];
+        let mission = state.segment(world, slot).mission;
+        let mut next = current.next.get() as usize;
+        while next + 1 < mission.len() && airplane.detours.contains(&mission[next]) {
+            let before = next.checked_sub(1).map_or(airplane.start.at, |before| mission[before]);
+            let frame = world.surface.frame_at(mission[next]);
+            let [way_point, before, at] =
+                [mission[next], before, current.pose().at].map(|place| frame.to_local(place));
+            if dot(sub(at, way_point), sub(way_point, before)) <= 0.0 {
+                break;
+            }
+            next += 1;
+        }
+        current.next.set(next as u32);
+    }
+}
 
 /// Reports the airplanes of `flown` that enter now with fallbacks that are not clear of an area: they are exempt from it.
 pub(super) fn report_exempt_areas(context: &mut PhaseContext<'_>, flown: &[EntitySlot]) {

@@ -19,6 +19,8 @@ pub struct AirplaneStart {
     pub start: Pose2,
     /// Way-points in the order in which it has to reach them.
     pub mission: Vec<Point>,
+    /// Those of its way-points, under any orders, that only lead around areas.
+    pub detours: Vec<Point>,
     /// Altitude in meters of the level on which the method takes it over.
     pub altitude_m: f64,
     /// Time of its appearance, in seconds after the start of the run.

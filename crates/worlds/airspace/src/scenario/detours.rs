@@ -2,7 +2,7 @@
 //!
 //! Where the straight way from one way-point to the next leads through an area that does not move, further way-points lead
 //! around it, as a flight planner would file them. Methods only have to return to the route then, also from concave
-//! areas. Areas that move, and those that are over before an airplane could come to them, are left to the method.
+//! areas. An airplane that others have pushed past such a way-point is done with it (`act/areas.rs`). Areas that move, and those that are over before an airplane could come to them, are left to the method.
 
 use crate::areas::{Area, Areas, DetourPlanner};
 use crate::flight::{AirplaneStart, FlightLevelRange, FlightTask, Point, Surface};
@@ -39,7 +39,9 @@ impl DetourRules<'_> {
                 v_m_s: airplane.model.v_m_s,
                 levels,
             };
-            airplane.mission = self.around_areas(mem::take(&mut airplane.mission), &mut leg);
+            let mut detours = Vec::new();
+            let mission = mem::take(&mut airplane.mission);
+            airplane.mission = self.around_areas(mission, &mut leg, &mut detours);
             for order in &mut airplane.orders {
                 // Nobody knows where it is when it is given the order, so only what comes after the first is planned.
                 if let FlightTask::WayPoints(way_points) = &mut order.task
@@ -47,14 +49,22 @@ impl DetourRules<'_> {
                 {
                     leg.from = first;
                     leg.at_s = order.at_s;
-                    let later = self.around_areas(way_points[1..].to_vec(), &mut leg);
+                    let later = way_points[1..].to_vec();
+                    let later = self.around_areas(later, &mut leg, &mut detours);
                     *way_points = [vec![first], later].concat();
                 }
             }
+            airplane.detours = detours;
         }
     }
 
-    fn around_areas(&self, way_points: Vec<Point>, leg: &mut Leg) -> Vec<Point> {
+    /// Returns way-points with further ones between them, which it adds to `detours` as well.
+    fn around_areas(
+        &self,
+        way_points: Vec<Point>,
+        leg: &mut Leg,
+        detours: &mut Vec<Point>,
+    ) -> Vec<Point> {
         let mut route = Vec::with_capacity(way_points.len());
         for way_point in way_points {
             let areas = self.areas.iter().map(|area| &**area).filter(|area| leg.may_meet(area));
@@ -64,6 +74,7 @@ impl DetourRules<'_> {
                 gap_m: GAP_TOLERANCES * self.tolerance_m + self.error_m + MORE_GAP_M,
             };
             let detour = planner.way_points(leg.from, way_point);
+            detours.extend_from_slice(&detour);
             for next in detour.into_iter().chain([way_point]) {
                 leg.at_s += self.surface.distance_m(leg.from, next) / leg.v_m_s;
                 leg.from = next;
