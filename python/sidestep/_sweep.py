@@ -168,7 +168,8 @@ def compare(
 
     ``methods`` are among ``"pc"`` (probability collectives), ``"orca"``, ``"mvp"`` and ``"none"``. Each flies ``runs``
     times, with consecutive seeds from ``seed`` on (the scenario's). The result has a dict of each method under ``"methods"``:
-    ``losses`` of separation, ``arrived`` (a proportion), ``delay_percent`` and others, each with its ``mean``, its 95 %
+    ``losses`` of separation, ``arrived`` (a proportion), ``delay_percent``, ``intrusion_prevention_rate``, ``domino_effect``
+    (conflicts beside those of the same traffic without resolution) and others, each with its ``mean``, its 95 %
     ``interval`` and ``n``; ``min_separation_m`` is the minimum over all runs.
 
     Use :func:`sweep` with ``baseline=``, or :func:`sidestep.stats.paired`, to compare any other two variants.

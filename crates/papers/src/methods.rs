@@ -43,6 +43,17 @@ pub struct MethodResult {
     pub messages: Estimate,
     /// Bytes per run.
     pub bytes: Estimate,
+    /// Conflicts per run; no value where the scenario does not measure pairs.
+    pub conflicts: Estimate,
+    /// Fraction of the conflicts of a run in which separation was not lost (IPR), 0 to 1.
+    pub intrusion_prevention_rate: Estimate,
+    /// Domino effect parameter (DEP): conflicts over those of the same traffic without any resolution, less 1. No value
+    /// where that traffic has no conflict, or cannot be flown.
+    pub domino_effect: Estimate,
+    /// Mean path over the ground beyond that of the flight alone, in percent of it.
+    pub extra_distance_percent: Estimate,
+    /// Maneuvers in an hour of flight.
+    pub maneuvers_per_flight_hour: Estimate,
     /// Decisions that the shield changed, per run.
     pub shield_overrides: Estimate,
     /// Whether the shield flew with the method.
@@ -62,6 +73,8 @@ pub struct BareResult {
     pub loss_free: usize,
     /// Losses of separation per run.
     pub losses: Estimate,
+    /// Domino effect parameter of the method alone, see [`MethodResult::domino_effect`].
+    pub domino_effect: Estimate,
     /// Mean time beyond that of the flight alone, in percent of it.
     pub delay_percent: Estimate,
     /// The price of the shield: the mean over runs of the delay with it less that without it, in percent.
@@ -103,29 +116,95 @@ impl Comparison<'_> {
             let remedy = "begin with a smaller seed, or run less often";
             InputError::new(self.source.file_place(), cause, remedy)
         })?;
+        let unresolved = self.run_unresolved(progress)?;
         let mut results = Vec::new();
-        for method in self.methods {
-            let overrides = [setting("airspace.method", method.name()).to_override()];
-            let source = self.source.clone().with_overrides(&overrides)?;
-            let runs =
-                MethodRuns { source: &source, workers: self.workers, interrupt: &self.interrupt };
-            let (effect, metrics) =
-                runs.run_seeds(self.seeds, |share| progress(method.name(), share))?;
-            let bare = match bare_source(&source) {
-                Some(bare) => {
-                    let runs = MethodRuns { source: &bare, ..runs };
-                    let name = format!("{} without the shield", method.name());
-                    Some(runs.run_seeds(self.seeds, |share| progress(&name, share))?)
-                }
-                None => None,
+        for &method in self.methods {
+            let source = self.source_of(method)?;
+            let bare_source = bare_source(&source);
+            let is_shielded = CompiledAirspace::new(&source)?.world.shield;
+            // Nothing resolves these conflicts, so that the reference is of the same runs.
+            let is_reference = |is_bare: bool| method == BuiltInMethod::None && is_bare;
+            let reference = |is_bare: bool| unresolved.clone().filter(|_| is_reference(is_bare));
+            let runs = match reference(!is_shielded) {
+                Some(known) => known,
+                None => self.run_seeds(&source, method.name(), progress)?,
             };
-            let mut result = method_result(method.name(), effect, &metrics);
-            result.is_shielded = CompiledAirspace::new(&source)?.world.shield;
-            result.bare = bare.map(|(effect, bare)| bare_result(effect, &metrics, &bare));
+            let bare = match (&bare_source, reference(true)) {
+                (Some(_), Some(known)) => Some(known),
+                (Some(bare), None) => {
+                    let name = format!("{} without the shield", method.name());
+                    Some(self.run_seeds(bare, &name, progress)?)
+                }
+                (None, _) => None,
+            };
+            let unresolved = unresolved.as_ref().map_or(&[][..], |runs| &runs.metrics);
+            let mut result = method_result(method.name(), &runs, unresolved);
+            result.is_shielded = is_shielded;
+            result.bare = bare.map(|bare| bare_result(&runs, &bare, unresolved));
             results.push(result);
         }
         Ok(results)
     }
+
+    /// Returns the scenario with a method.
+    fn source_of(&self, method: BuiltInMethod) -> Result<Source, InputError> {
+        let overrides = [setting("airspace.method", method.name()).to_override()];
+        self.source.clone().with_overrides(&overrides)
+    }
+
+    /// Runs the same traffic without any resolution, as the reference of the domino effect; `None` if that is not valid,
+    /// or if the scenario does not measure pairs.
+    fn run_unresolved(
+        &self,
+        progress: &mut Progress<'_>,
+    ) -> Result<Option<SeededRuns>, InputError> {
+        let source = self.source_of(BuiltInMethod::None)?;
+        let Ok(compiled) = CompiledAirspace::new(&source) else { return Ok(None) };
+        let bare = if compiled.world.shield { bare_source(&source) } else { Some(source) };
+        let Some(bare) = bare.filter(|_| compiled.world.measures.pairs.is_some()) else {
+            return Ok(None);
+        };
+        self.run_seeds(&bare, "the same traffic without resolution", progress).map(Some)
+    }
+
+    fn run_seeds(
+        &self,
+        source: &Source,
+        name: &str,
+        progress: &mut Progress<'_>,
+    ) -> Result<SeededRuns, InputError> {
+        let runs = MethodRuns { source, workers: self.workers, interrupt: &self.interrupt };
+        let (seeds, metrics) = runs.run_seeds(self.seeds, |share| progress(name, share))?;
+        Ok(SeededRuns { seeds, metrics })
+    }
+}
+
+/// The runs of a scenario with several seeds, in their order.
+#[derive(Debug, Clone)]
+struct SeededRuns {
+    /// The effect of another seed; where it changes nothing, there is one run.
+    seeds: SeedEffect,
+    metrics: Vec<Metrics>,
+}
+
+impl SeededRuns {
+    /// Returns the metrics of a run; where seeds change nothing, its one run stands for all.
+    fn of_seed(all: &[Metrics], k: usize) -> Option<&Metrics> {
+        all.get(k).or(all.first())
+    }
+}
+
+/// Returns the domino effect parameter of each run: how many conflicts it has beside each of the unresolved ones, less 1.
+///
+/// Krozel, Peters, Bilimoria, Lee and Mitchell, "System Performance Characteristics of Centralized and Decentralized Air
+/// Traffic Separation Strategies" (2001): `DEP = S_on / S_off - 1`.
+fn domino_effect(runs: &[Metrics], unresolved: &[Metrics]) -> Estimate {
+    let effects = (0..runs.len().max(unresolved.len())).map(|k| {
+        let conflicts = SeededRuns::of_seed(runs, k)?.conflicts?;
+        let without = SeededRuns::of_seed(unresolved, k)?.conflicts.filter(|all| *all > 0)?;
+        Some(conflicts as f64 / without as f64 - 1.0)
+    });
+    mean_of(effects)
 }
 
 /// Returns a scenario without its shield; `None` if it has none, or rules that need it.
@@ -202,7 +281,9 @@ fn run_to_end(source: &Source, interrupt: &Interrupt) -> Result<(Metrics, Digest
     Ok((run.metrics(), run.digest()))
 }
 
-fn method_result(method: &'static str, seeds: SeedEffect, all: &[Metrics]) -> MethodResult {
+fn method_result(method: &'static str, runs: &SeededRuns, unresolved: &[Metrics]) -> MethodResult {
+    let SeededRuns { seeds, metrics: all } = runs;
+    let seeds = *seeds;
     let loss_free = all.iter().filter(|m| m.losses_of_separation == 0).count();
     // Where seeds change nothing there is one run, of which an interval would claim that it is a sample of others.
     let loss_free_interval =
@@ -220,6 +301,11 @@ fn method_result(method: &'static str, seeds: SeedEffect, all: &[Metrics]) -> Me
         optimize_cpu_s: mean(all, |m| Some(m.optimize_cpu_s)),
         messages: mean(all, |m| Some(m.messages as f64)),
         bytes: mean(all, |m| Some(m.bytes as f64)),
+        conflicts: mean(all, |m| m.conflicts.map(|conflicts| conflicts as f64)),
+        intrusion_prevention_rate: mean(all, |m| m.intrusion_prevention_rate),
+        domino_effect: domino_effect(all, unresolved),
+        extra_distance_percent: mean(all, |m| m.mean_extra_distance_percent),
+        maneuvers_per_flight_hour: mean(all, |m| m.maneuvers_per_flight_hour),
         shield_overrides: mean(all, |m| Some(m.shield_overrides as f64)),
         is_shielded: false,
         bare: None,
@@ -227,16 +313,17 @@ fn method_result(method: &'static str, seeds: SeedEffect, all: &[Metrics]) -> Me
 }
 
 /// Returns the results of runs without the shield beside those with it.
-fn bare_result(seeds: SeedEffect, shielded: &[Metrics], bare: &[Metrics]) -> BareResult {
-    // Where seeds change nothing on one side, its one run stands for all.
-    let of_seed = |all: &[Metrics], k: usize| all.get(k).or(all.first())?.mean_delay_percent;
-    let prices = (0..shielded.len().max(bare.len()))
-        .map(|k| Some(of_seed(shielded, k)? - of_seed(bare, k)?));
+fn bare_result(shielded: &SeededRuns, bare: &SeededRuns, unresolved: &[Metrics]) -> BareResult {
+    let SeededRuns { seeds, metrics: bare } = bare;
+    let delay = |all: &[Metrics], k: usize| SeededRuns::of_seed(all, k)?.mean_delay_percent;
+    let prices = (0..shielded.metrics.len().max(bare.len()))
+        .map(|k| Some(delay(&shielded.metrics, k)? - delay(bare, k)?));
     BareResult {
         runs: bare.len(),
-        seeds,
+        seeds: *seeds,
         loss_free: bare.iter().filter(|m| m.losses_of_separation == 0).count(),
         losses: mean(bare, |m| Some(m.losses_of_separation as f64)),
+        domino_effect: domino_effect(bare, unresolved),
         delay_percent: mean(bare, |m| m.mean_delay_percent),
         price_percent: mean_of(prices),
     }
@@ -269,6 +356,10 @@ pub fn table(title: &str, results: &[MethodResult]) -> Table {
         }),
         ("losses", &|r| format_mean(r.seeds, &r.losses)),
         ("bare: losses", &|r| format_bare(r, |bare| format_mean(bare.seeds, &bare.losses))),
+        ("conflicts", &|r| format_mean(r.seeds, &r.conflicts)),
+        ("IPR", &|r| format_mean(r.seeds, &r.intrusion_prevention_rate)),
+        ("DEP", &|r| format_mean(r.seeds, &r.domino_effect)),
+        ("bare: DEP", &|r| format_bare(r, |bare| format_mean(bare.seeds, &bare.domino_effect))),
         ("delay, %", &|r| format_mean(r.seeds, &r.delay_percent)),
         ("bare: delay, %", &|r| {
             format_bare(r, |bare| format_mean(bare.seeds, &bare.delay_percent))
@@ -280,6 +371,8 @@ pub fn table(title: &str, results: &[MethodResult]) -> Table {
                 format_mean(seeds, &bare.price_percent)
             })
         }),
+        ("extra distance, %", &|r| format_mean(r.seeds, &r.extra_distance_percent)),
+        ("maneuvers per flight hour", &|r| format_mean(r.seeds, &r.maneuvers_per_flight_hour)),
         ("changed by the shield", &|r| format_mean(r.seeds, &r.shield_overrides)),
         ("nearest of all runs, m", &|r| {
             r.min_separation_m.map_or("-".into(), |d| format!("{d:.1}"))
@@ -293,10 +386,21 @@ pub fn table(title: &str, results: &[MethodResult]) -> Table {
     if results.iter().all(|result| result.bare.is_none()) {
         columns.retain(|(head, _)| !head.starts_with("bare: ") && *head != "by the shield, %");
     }
+    // Without measures of pairs there is no conflict to count, and without a reference no domino effect.
+    if results.iter().all(|result| result.conflicts.n == 0) {
+        columns.retain(|(head, _)| !["conflicts", "IPR"].contains(head));
+    }
+    if !has_domino_effect(results) {
+        columns.retain(|(head, _)| !["DEP", "bare: DEP"].contains(head));
+    }
     if !results.iter().any(|result| result.is_shielded) {
         columns.retain(|(head, _)| *head != "changed by the shield");
     }
     case_results::table(title, table_note(results), results, &columns)
+}
+
+fn has_domino_effect(results: &[MethodResult]) -> bool {
+    results.iter().any(|result| result.domino_effect.n > 0)
 }
 
 /// Returns a result without the shield; a dash where there is none.
@@ -351,6 +455,14 @@ fn method_names(results: &[MethodResult], holds: impl Fn(&MethodResult) -> bool)
 fn table_note(results: &[MethodResult]) -> String {
     let mut sentences = vec!["Every method flies the same traffic.".to_string()];
     sentences.extend(shield_note(results));
+    if has_domino_effect(results) {
+        sentences.push(
+            "IPR is the share of conflicts in which separation is kept. DEP (domino effect parameter) compares the \
+             conflicts with those of the same traffic without any resolution: 0.5 is half as many again, and below 0 a \
+             method prevents more than it causes."
+                .into(),
+        );
+    }
     if results.iter().any(|result| result.seeds == SeedEffect::Decide) {
         sentences.push(
             "Means over runs, with their 95 % intervals; none where all runs are equal.".into(),
@@ -419,6 +531,51 @@ mod tests {
         assert!(pc[0] == "pc" && pc[1].starts_with("3/3"), "{pc:?}");
         assert!(none[0] == "none" && none[1].starts_with("0/3"), "{none:?}");
         assert!(!table.note.contains("shield"), "{}", table.note);
+    }
+
+    #[test]
+    fn the_domino_effect_is_that_beside_the_same_traffic_without_resolution() {
+        let text = "format = 1\nworld = \"airspace\"\n[airspace]\nshield = \"off\"\n\
+                    [airspace.generator]\nkind = \"superconflict\"\nn = 6\n";
+        let source = Source::new("six", text, "");
+        let methods = [BuiltInMethod::Mvp, BuiltInMethod::None];
+        let results = compare(&source, &methods, 3);
+        let [mvp, none] = &results[..] else { panic!("two methods: {results:?}") };
+        assert_eq!(none.domino_effect.mean, Some(0.0), "it is its own reference");
+        // All pairs of six meet, and none keeps its separation.
+        assert_eq!(
+            (none.conflicts.mean, none.intrusion_prevention_rate.mean),
+            (Some(15.0), Some(0.0))
+        );
+        assert_eq!(mvp.intrusion_prevention_rate.mean, Some(1.0));
+        let effects = (1..=3).map(|seed| {
+            let conflicts = |method: &str| {
+                let overrides = [format!("seed={seed}"), format!("airspace.method=\"{method}\"")];
+                let source = source.clone().with_overrides(&overrides).expect("keys");
+                let interrupt = Interrupt::default();
+                run_to_end(&source, &interrupt).expect("valid").0.conflicts.expect("measured")
+                    as f64
+            };
+            conflicts("mvp") / conflicts("none") - 1.0
+        });
+        let mean = effects.sum::<f64>() / 3.0;
+        assert!(mvp.domino_effect.mean.is_some_and(|found| (found - mean).abs() < 1e-12), "{mean}");
+        // The reference is flown for a method alone, too.
+        let alone = compare(&source, &methods[..1], 3);
+        assert_eq!(alone[0].domino_effect, mvp.domino_effect);
+        assert!(table("t", &alone).columns.iter().any(|head| head == "DEP"));
+    }
+
+    #[test]
+    fn without_measures_of_pairs_there_are_no_columns_of_conflicts() {
+        let text = "format = 1\nworld = \"airspace\"\n[airspace]\nshield = \"off\"\n\
+                    measures = { pairs = \"off\" }\n\
+                    [airspace.generator]\nkind = \"superconflict\"\nn = 2\n";
+        let results = compare(&Source::new("two", text, ""), &[BuiltInMethod::None], 1);
+        let table = table("t", &results);
+        for head in ["conflicts", "IPR", "DEP"] {
+            assert!(!table.columns.iter().any(|column| column == head), "{head}");
+        }
     }
 
     #[test]

@@ -18,6 +18,11 @@ fn a_run_ends_when_all_have_arrived_and_says_what_came_of_it() {
     assert!(metrics["min_separation_m"].as_f64().is_some_and(|d| d >= 500.0));
     for key in [
         "mean_delay_percent",
+        "conflicts",
+        "intrusion_prevention_rate",
+        "well_clear_violations",
+        "mean_extra_distance_percent",
+        "maneuvers_per_flight_hour",
         "messages",
         "bytes",
         "optimizations",
@@ -132,7 +137,7 @@ fn trouble_on_the_network_is_told_and_recorded_and_nobody_comes_too_near() {
         assert!(told.out().contains(words), "{}", told.out());
     }
     let written = names(&place.path("six"));
-    for table in ["events", "optimizations"] {
+    for table in ["events", "optimizations", "pairs"] {
         assert!(written.contains(&table.to_string()), "{written:?}");
     }
     let summary: Value = serde_json::from_str(&place.read("six/summary.json")).expect("JSON");
@@ -188,8 +193,11 @@ fn methods_are_compared_with_and_without_the_shield_where_there_is_one() {
     assert_eq!([&told["loss_free"], &told["bare"]["loss_free"]], [1, 0]);
     assert_eq!(told["bare"]["delay_percent"]["mean"], 0.0, "without it they fly straight on");
     assert_eq!(told["bare"]["price_percent"]["mean"], told["delay_percent"]["mean"]);
+    // Straight flight without the shield is what the domino effect compares with.
+    assert_eq!(told["bare"]["domino_effect"]["mean"], 0.0);
+    assert!(told["domino_effect"]["mean"].is_number(), "{told}");
     let shielded = place.run(&compare).out();
-    assert!(shielded.contains("bare: losses"), "{shielded}");
+    assert!(shielded.contains("bare: losses") && shielded.contains("DEP"), "{shielded}");
     let without = [&compare[..], &["--set", "airspace.shield=off"]].concat();
     assert_eq!(place.json(&without)["methods"][0]["bare"], Value::Null);
     assert!(!place.run(&without).out().contains("bare"));

@@ -109,8 +109,8 @@ fn a_fleet_whose_folder_or_table_is_deleted_while_it_flies_ends_and_names_it() {
         return;
     }
     let realtime = ["--clock", "realtime", "--speed", "30"];
-    let simulated_tables = ["events", "optimizations", "series", "trajectories"];
-    let flown_tables = ["controls", "events", "optimizations", "series", "trajectories"];
+    let simulated_tables = ["events", "optimizations", "pairs", "series", "trajectories"];
+    let flown_tables = ["controls", "events", "optimizations", "pairs", "series", "trajectories"];
     for (clock, names, gone) in [
         (&[][..], &simulated_tables[..], "r"),
         (&realtime, &flown_tables, "r"),

@@ -12,8 +12,10 @@
 //! flight     flight/: motion, orders, tracks    areas/: areas   non_cooperative.rs, flight_plan.rs, generate.rs
 //! shield     shield/: plans that stay safe forever              avoid.rs: paths clear of non-cooperative aircraft
 //! agents     agents/: programs aboard, and their messages       objective.rs: the minimized cost    baseline/: ORCA, MVP
+//!            measures/: definitions of conflict, well clear, fuel
 //! pilot      pilot/: an aircraft from percept to control        world.rs (immutable)    decide.rs: candidates
 //! act        perceive.rs -> join.rs -> act.rs: one cycle of dt  state.rs (mutable)    deploy/: pilots on a network in memory
+//!            encounters/: conflicts, losses and violations of pairs in a run
 //! run        scenario.rs, world_impl.rs, view.rs, ...           what a run, a file or a caller needs of it
 //! ```
 
@@ -25,6 +27,7 @@ pub mod baseline;
 mod bundle;
 mod decide;
 pub mod deploy;
+pub mod encounters;
 pub mod events;
 mod external;
 pub mod external_action;
@@ -37,6 +40,7 @@ mod import;
 mod inspect;
 mod join;
 pub mod kinds;
+pub mod measures;
 pub mod method;
 mod metric_info;
 pub mod metrics;

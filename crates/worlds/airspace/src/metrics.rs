@@ -1,6 +1,7 @@
 //! The metrics of a run.
 
 use super::decide::OptimizationStats;
+use super::encounters::Encounters;
 use super::events::{Event, EventKind};
 use super::flight::FlightPhase;
 use super::state::{AirplaneState, AirspaceState, PairRecord};
@@ -30,6 +31,8 @@ pub struct Counters {
     pub areas: BTreeMap<(EntityId, u32), AreaRecord>,
     /// Airplanes that the shield does not keep clear of an area, with the first cycle of each.
     pub exempt_areas: BTreeMap<(EntityId, u32), Cycle>,
+    /// Conflicts and other encounters of pairs; none where they are not measured.
+    pub encounters: Encounters,
 }
 
 /// The time of an airplane where an area does not permit it to be.
@@ -78,6 +81,12 @@ impl Counters {
         }
     }
 
+    /// Returns whether the shield has reported a pair, because it promises nothing for it.
+    pub(super) fn is_reported(&self, [a, b]: [EntityId; 2]) -> bool {
+        let is_beyond_bound = [a, b].iter().any(|id| self.beyond_bound.contains_key(id));
+        is_beyond_bound || self.too_close.contains_key(&(a.min(b), a.max(b)))
+    }
+
     fn event_count(&self, kind: EventKind) -> u64 {
         self.events.get(&kind).copied().unwrap_or(0)
     }
@@ -114,6 +123,22 @@ metrics! {
         pub area_entries_unreported: Option<u64> => "unreported entries of areas",
         /// Time that airplanes spent where areas do not permit them to be. In seconds; none without areas.
         pub area_s: Option<f64> => "time in areas",
+        /// Conflicts: times that a loss was predicted within the look-ahead, if both fly straight on with their present
+        /// velocities. A loss that was not predicted counts as a conflict too; none where pairs are not measured.
+        pub conflicts: Option<u64> => "conflicts",
+        /// Conflicts in which separation was lost.
+        pub intrusions: Option<u64> => "intrusions",
+        /// Fraction of conflicts in which separation was not lost (IPR), 0 to 1; none without a conflict.
+        pub intrusion_prevention_rate: Option<f64> => "intrusion prevention rate",
+        /// Mean severity of intrusions: the largest share of the separation that was lost, of the horizontal or vertical part
+        /// of which less was lost, 0 to 1; none without an intrusion.
+        pub mean_los_severity: Option<f64> => "mean severity of losses of separation",
+        /// Largest severity of an intrusion.
+        pub max_los_severity: Option<f64> => "largest severity of a loss of separation",
+        /// Times that two were not well clear of each other, by the volume of `airspace.well_clear`.
+        pub well_clear_violations: Option<u64> => "violations of well clear",
+        /// Near mid-air collisions: times that two came nearer than `airspace.nmac`.
+        pub nmacs: Option<u64> => "near mid-air collisions",
         /// Airplanes that have reached their last way-point.
         pub arrived: u64 => "airplanes arrived",
         /// All airplanes.
@@ -128,6 +153,22 @@ metrics! {
         pub descent_delay_percent: Option<f64> => "mean delay of flights in descent",
         /// The same mean, over recorded flights that kept their level at their handover.
         pub cruise_delay_percent: Option<f64> => "mean delay of flights in cruise",
+        /// Mean, over those with a delay, of the time beyond that of the flight alone. In seconds.
+        pub mean_extra_time_s: Option<f64> => "mean extra time",
+        /// Mean, over the same, of the path over the ground beyond that of the flight alone. In meters; none where flights are
+        /// not measured.
+        pub mean_extra_distance_m: Option<f64> => "mean extra distance",
+        /// The same mean, in percent of the path alone.
+        pub mean_extra_distance_percent: Option<f64> => "mean relative extra distance",
+        /// Mean, over the same, of the proxy of fuel beyond that of the flight alone, in percent of it. It is the work against
+        /// drag and gravity at a constant weight, and no fuel of any engine.
+        pub mean_extra_fuel_percent: Option<f64> => "mean extra fuel (proxy)",
+        /// Maneuvers: times that an airplane began to turn away from its flight plan to one side.
+        pub maneuvers: Option<u64> => "maneuvers",
+        /// Maneuvers that revoked one to the other side, without a step on the flight plan between them.
+        pub maneuver_reversals: Option<u64> => "reversals of maneuvers",
+        /// Maneuvers in an hour of flight, of all flights that a method flew.
+        pub maneuvers_per_flight_hour: Option<f64> => "maneuvers per flight hour",
         /// Airplanes still in the air when the run ended, without a delay. The mean delay is too low where late ones are among
         /// them.
         pub in_flight: u64 => "airplanes still in the air",
@@ -257,6 +298,16 @@ metrics! {
         pub alone_s: f64 => "flight alone",
         /// Time beyond that of the flight alone, in percent of it.
         pub delay_percent: Option<f64> => "delay",
+        /// Path over the ground beyond that of the flight alone. In meters; none before the arrival.
+        pub extra_distance_m: Option<f64> => "extra distance",
+        /// The same, in percent of the path alone.
+        pub extra_distance_percent: Option<f64> => "relative extra distance",
+        /// Proxy of fuel beyond that of the flight alone, in percent of it.
+        pub extra_fuel_percent: Option<f64> => "extra fuel (proxy)",
+        /// Times that it began to turn away from its flight plan to one side; none where flights are not measured.
+        pub maneuvers: Option<u32> => "maneuvers",
+        /// Maneuvers that revoked one to the other side.
+        pub maneuver_reversals: Option<u32> => "reversals of maneuvers",
         /// Number of times that the shield changed its wish.
         pub shield_overrides: u32,
         /// Number of those times when it fell back to its orbit.
@@ -308,22 +359,38 @@ pub fn airplane_metrics(
     let joined_s = world.cycle_start_s(world.first_controlled_cycle(id as usize));
     let arrived_s = airplane.arrived_step().map(|step| step as f64 * world.timing.dtau_s);
     let flown_s = arrived_s.map(|s| s - joined_s).filter(|_| !is_fully_replayed(world, id));
+    let delay_percent = flown_s
+        .filter(|_| alone_s > 0.0 && alone_s.is_finite())
+        // One that avoids nobody is never delayed.
+        .filter(|_| !world.airplanes[id as usize].is_non_cooperative)
+        .map(|s| 100.0 * (s - alone_s) / alone_s);
+    let effort = state.effort(id);
+    let alone = &world.alone_efforts[id as usize];
+    let ended_effort = effort.filter(|_| delay_percent.is_some());
     AirplaneMetrics {
         airplane: id,
         callsign: world.callsign(id),
         flown_s,
         alone_s,
-        delay_percent: flown_s
-            .filter(|_| alone_s > 0.0 && alone_s.is_finite())
-            // One that avoids nobody is never delayed.
-            .filter(|_| !world.airplanes[id as usize].is_non_cooperative)
-            .map(|s| 100.0 * (s - alone_s) / alone_s),
+        delay_percent,
+        extra_distance_m: ended_effort.map(|effort| effort.ground_m - alone.ground_m),
+        extra_distance_percent: ended_effort
+            .and_then(|effort| extra_percent(effort.ground_m, alone.ground_m)),
+        extra_fuel_percent: ended_effort
+            .and_then(|effort| extra_percent(effort.fuel_m, alone.fuel_m)),
+        maneuvers: effort.map(|effort| effort.maneuvers),
+        maneuver_reversals: effort.map(|effort| effort.reversals),
         shield_overrides: airplane.overrides.get(),
         shield_orbits: airplane.orbits.get(),
         left: airplane.has_left(),
         orders: world.airplanes[id as usize].whole_orders(airplane.orders.get()),
         orders_delayed: airplane.waits.get(),
     }
+}
+
+/// Returns by how many percent a cost is above that of the flight alone; `None` where that is nothing.
+fn extra_percent(cost: f64, alone: f64) -> Option<f64> {
+    (alone > 0.0).then(|| 100.0 * (cost - alone) / alone)
 }
 
 fn is_fully_replayed(world: &AirspaceWorld, id: EntityId) -> bool {
@@ -366,10 +433,7 @@ fn replayed_count(world: &AirspaceWorld, state: &AirspaceState) -> u64 {
 fn losses_by_report(counters: &Counters) -> [u64; 2] {
     let mut losses = [0, 0];
     for ((a, b), record) in &counters.pairs {
-        let is_beyond_bound = [a, b].iter().any(|id| counters.beyond_bound.contains_key(id));
-        let pair = (*a.min(b), *a.max(b));
-        let is_reported = is_beyond_bound || counters.too_close.contains_key(&pair);
-        losses[usize::from(!is_reported)] += u64::from(record.losses);
+        losses[usize::from(!counters.is_reported([*a, *b]))] += u64::from(record.losses);
     }
     losses
 }
@@ -409,6 +473,27 @@ fn delay_in_phase(
     mean(delays.iter().sum(), delays.len())
 }
 
+/// Returns the mean of a metric over the airplanes that have it.
+fn mean_over(
+    all: &[AirplaneMetrics],
+    metric: impl Fn(&AirplaneMetrics) -> Option<f64>,
+) -> Option<f64> {
+    let values: Vec<f64> = all.iter().filter_map(metric).collect();
+    mean(values.iter().sum(), values.len())
+}
+
+/// Returns the maneuvers in an hour of flight; `None` where nothing was flown or measured.
+fn maneuvers_per_flight_hour(state: &AirspaceState) -> Option<f64> {
+    let mut maneuvers: u64 = 0;
+    let mut flown_s = 0.0;
+    for id in 0..state.airplanes.len() as EntityId {
+        let effort = state.effort(id)?;
+        maneuvers += u64::from(effort.maneuvers);
+        flown_s += effort.flown_s;
+    }
+    (flown_s > 0.0).then(|| maneuvers as f64 * 3600.0 / flown_s)
+}
+
 fn mean(sum: f64, n: usize) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
@@ -446,6 +531,10 @@ pub(crate) fn metrics(
     let beside_areas = |entries: u64| (!world.areas.is_empty()).then_some(entries);
     let losses_in = |phase| losses_in_phase(world, counters, phase);
     let delay_in = |phase| delay_in_phase(world, &all, phase);
+    let encounters = world.measures.pairs.map(|_| counters.encounters.counts());
+    let sum_of = |count: fn(&AirplaneMetrics) -> Option<u32>| {
+        world.measures.flights.map(|_| all.iter().filter_map(count).map(u64::from).sum())
+    };
     let not_appeared = not_appeared_count(world, now);
     let unfinished = count_airplanes_where(state, AirplaneState::is_unfinished);
     Metrics {
@@ -462,12 +551,30 @@ pub(crate) fn metrics(
         area_entries_unreported: beside_areas(area_entries_unreported),
         area_s: (!world.areas.is_empty())
             .then(|| counters.areas.values().map(|r| r.inside_ns).sum::<u64>() as f64 / 1e9),
+        conflicts: encounters.map(|counts| counts.conflicts),
+        intrusions: encounters.map(|counts| counts.intrusions),
+        intrusion_prevention_rate: encounters.and_then(|counts| counts.intrusion_prevention_rate()),
+        mean_los_severity: encounters.and_then(|counts| counts.mean_severity()),
+        max_los_severity: encounters
+            .filter(|counts| counts.intrusions > 0)
+            .map(|counts| counts.max_severity),
+        well_clear_violations: encounters.map(|counts| counts.well_clear_violations),
+        nmacs: encounters.map(|counts| counts.nmacs),
         arrived: count_airplanes_where(state, |airplane| airplane.arrived_step().is_some()),
         airplanes: all.len() as u64,
         mean_delay_percent: mean(delays.iter().sum(), delays.len()),
         climb_delay_percent: delay_in(FlightPhase::Climb),
         descent_delay_percent: delay_in(FlightPhase::Descent),
         cruise_delay_percent: delay_in(FlightPhase::Cruise),
+        mean_extra_time_s: mean_over(&all, |one| {
+            one.delay_percent.and(one.flown_s).map(|flown_s| flown_s - one.alone_s)
+        }),
+        mean_extra_distance_m: mean_over(&all, |one| one.extra_distance_m),
+        mean_extra_distance_percent: mean_over(&all, |one| one.extra_distance_percent),
+        mean_extra_fuel_percent: mean_over(&all, |one| one.extra_fuel_percent),
+        maneuvers: sum_of(|one| one.maneuvers),
+        maneuver_reversals: sum_of(|one| one.maneuver_reversals),
+        maneuvers_per_flight_hour: maneuvers_per_flight_hour(state),
         in_flight: unfinished.saturating_sub(not_appeared),
         messages: traffic.messages,
         bytes: traffic.bytes,

@@ -1,6 +1,7 @@
 //! The tables that a run records, and their rows until they are recorded.
 
 use super::decide::OptimizationRecord;
+use super::encounters::EndedEncounter;
 use super::events::{Event, EventKind, EventQuantity};
 use super::flight::{ConstantRateLeg, Pose2};
 use super::settings::RecordSection;
@@ -143,6 +144,49 @@ fn optimizations_table() -> Table<OptimizationRecord> {
         .u64("bytes", "their bytes", |o| o.traffic.bytes)
 }
 
+fn pairs_table(world: &AirspaceWorld) -> Table<EndedEncounter> {
+    let [callsigns, other_callsigns] = [callsigns(world), callsigns(world)];
+    let table = Table::new("pairs")
+        .u64("cycle", "cycle of dt in which the encounter ended", |e: &EndedEncounter| e.cycle)
+        .u32("airplane", "entity id", |e| e.airplanes[0])
+        .text("callsign", "its call sign", move |e: &EndedEncounter| {
+            callsigns.get(e.airplanes[0] as usize).cloned().flatten()
+        })
+        .u32("other", "the other airplane", |e| e.airplanes[1])
+        .text("other_callsign", "its call sign", move |e: &EndedEncounter| {
+            other_callsigns.get(e.airplanes[1] as usize).cloned().flatten()
+        })
+        .f64("from_s", "start of the encounter, after the start of the run", |e| e.encounter.from_s)
+        .f64("until_s", "its end", |e| e.encounter.until_s)
+        .f64("nearest_m", "closest horizontal approach in it", |e| e.encounter.nearest_m)
+        .f64("vertical_m", "difference of altitude at that time", |e| e.encounter.vertical_m)
+        .u64("conflicts", "conflicts in it", |e| e.encounter.counts.conflicts)
+        .u64("intrusions", "conflicts in which separation was lost", |e| {
+            e.encounter.counts.intrusions
+        })
+        .f64("severity", "largest severity of a loss of separation, 0 to 1", |e| {
+            e.encounter.counts.max_severity
+        })
+        .u64("well_clear_violations", "violations of well clear", |e| {
+            e.encounter.counts.well_clear_violations
+        })
+        .u64("nmacs", "near mid-air collisions", |e| e.encounter.counts.nmacs)
+        .label("reported", "whether the shield had reported the pair", ["no", "yes"], |e| {
+            u32::from(e.is_reported)
+        });
+    with_encounter_time(table, world)
+}
+
+/// Adds the time of day at which an encounter began, where the scenario has one.
+fn with_encounter_time(
+    table: Table<EndedEncounter>,
+    world: &AirspaceWorld,
+) -> Table<EndedEncounter> {
+    let Some(start_utc_s) = world.start_utc_s else { return table };
+    let utc_s = move |e: &EndedEncounter| start_utc_s + e.encounter.from_s;
+    table.f64("utc_s", "start of the encounter, seconds since 1970, UTC", utc_s)
+}
+
 fn callsigns(world: &AirspaceWorld) -> Vec<Option<String>> {
     world.airplanes.iter().map(|airplane| airplane.callsign.clone()).collect()
 }
@@ -154,6 +198,7 @@ pub(super) struct RecordBuffers {
     flown: TableRowsBuffer<FlownLeg>,
     events: TableRowsBuffer<Event>,
     optimizations: TableRowsBuffer<OptimizationRecord>,
+    pairs: TableRowsBuffer<EndedEncounter>,
 }
 
 impl RecordBuffers {
@@ -172,6 +217,9 @@ impl RecordBuffers {
         self.flown.set_table(self.record.trajectories.then(|| trajectories_table(world)));
         self.events.set_table(self.record.events.then(|| events_table(world)));
         self.optimizations.set_table(self.record.optimizations.then(optimizations_table));
+        // Without their measures there are no rows, and an empty table would say that nothing was found.
+        let with_pairs = self.record.pairs && world.measures.pairs.is_some();
+        self.pairs.set_table(with_pairs.then(|| pairs_table(world)));
     }
 
     pub(super) fn push_flown_leg(&mut self, flown: FlownLeg) {
@@ -182,6 +230,10 @@ impl RecordBuffers {
         self.events.push(event);
     }
 
+    pub(super) fn push_encounter(&mut self, encounter: EndedEncounter) {
+        self.pairs.push(encounter);
+    }
+
     pub(super) fn push_optimization(&mut self, optimization: OptimizationRecord) {
         self.optimizations.push(optimization);
     }
@@ -189,10 +241,10 @@ impl RecordBuffers {
 
 impl TableBuffers for RecordBuffers {
     fn table_buffers(&self) -> Vec<&dyn TableBuffer> {
-        vec![&self.flown, &self.events, &self.optimizations]
+        vec![&self.flown, &self.events, &self.optimizations, &self.pairs]
     }
 
     fn table_buffers_mut(&mut self) -> Vec<&mut dyn TableBuffer> {
-        vec![&mut self.flown, &mut self.events, &mut self.optimizations]
+        vec![&mut self.flown, &mut self.events, &mut self.optimizations, &mut self.pairs]
     }
 }

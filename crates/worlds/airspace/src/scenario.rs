@@ -7,6 +7,7 @@ mod detours;
 mod earth;
 mod effectless;
 mod gusts;
+mod measures;
 mod network;
 mod optimizer;
 mod performance;
@@ -30,6 +31,7 @@ use airplanes::{GeneratorSection, ModelSection};
 use areas::{AreaSection, load_areas_file};
 use compile::Compiler;
 use gusts::GustsSection;
+use measures::{MeasuresSection, NmacSection, WellClearSection};
 use network::NetworkSection;
 use optimizer::{LegsSection, MvpSection, OnOffSwitch, ReactiveSection, TimeList};
 pub(super) use remarks::scenario_remarks;
@@ -141,6 +143,9 @@ struct AirspaceSection {
     position_noise_m: Option<Number<Closed<0, 1_000_000>>>,
     heading_noise_deg: Option<Number<HeadingNoise>>,
     error_sigmas: Option<Number<Closed<0, 100>>>,
+    measures: MeasuresSection,
+    well_clear: Option<WellClearSection>,
+    nmac: Option<NmacSection>,
 }
 
 /// Returns the JSON Schema of a scenario's sections; `own` are methods beside the built-in ones.
@@ -294,6 +299,7 @@ impl CompiledAirspace {
             orbit_poses: Vec::new(),
             external_actions: Vec::new(),
             controls: None,
+            efforts: Vec::new(),
         }
     }
 }

@@ -144,6 +144,8 @@ pub struct RecordSection {
     pub events: bool,
     /// A row per optimization.
     pub optimizations: bool,
+    /// A row per encounter of two airplanes, see [`super::encounters`].
+    pub pairs: bool,
     /// The controls of airplanes with pilots outside of the run, so that it can be computed again.
     pub controls: bool,
     /// Number of cycles between two checkpoints; 0 for none.
@@ -158,6 +160,7 @@ impl Default for RecordSection {
             trajectories: true,
             events: true,
             optimizations: true,
+            pairs: true,
             controls: false,
             checkpoint_every: 1000,
             series_every: None,

@@ -8,6 +8,7 @@ use super::agents::traffic_state::TrafficPicture;
 use super::baseline::mvp::ActiveResolutions;
 use super::external_action::ExternalAction;
 use super::flight::{InterOrderSegment, Pose2, Surface};
+use super::measures::FlightEffort;
 use super::method::MethodKind;
 use super::pilot::{AirplaneControl, PilotMemory};
 use super::shield::{ExemptIds, Fallback};
@@ -37,6 +38,8 @@ pub struct AirspaceState {
     orbit_poses: Box<[OrbitPose]>,
     /// The turn rate of each airplane in the step that it flew last, in radians per second.
     turn_rates_rad_s: Box<[AtomicCell<f64>]>,
+    /// What the flight of each airplane has cost; empty unless that is measured.
+    efforts: Box<[Mutex<FlightEffort>]>,
     /// The altitude in meters to which each airplane may change its level in this cycle. It is found anew in each cycle,
     /// and so no part of a snapshot.
     cleared_m: Box<[AtomicCell<f64>]>,
@@ -218,6 +221,7 @@ impl AirspaceState {
         let with_orbit_poses = if has_gusts { n } else { 0 };
         let with_external_actions =
             if matches!(world.method, MethodKind::External) { n } else { 0 };
+        let with_efforts = if world.measures.flights.is_some() { n } else { 0 };
         let controls_cycle = AtomicCell::default();
         controls_cycle.set(NEVER);
         let state = Self {
@@ -228,6 +232,7 @@ impl AirspaceState {
             resolving: restore_memories(with_resolutions, &snapshot.resolving),
             exempt: (0..n).map(|_| Mutex::default()).collect(),
             orbit_poses: (0..with_orbit_poses).map(|_| OrbitPose::default()).collect(),
+            efforts: restore_memories(with_efforts, &snapshot.efforts),
             cleared_m: snapshot
                 .airplanes
                 .iter()
@@ -361,6 +366,16 @@ impl AirspaceState {
         self.turn_rates_rad_s[slot as usize].set(omega_rad_s);
     }
 
+    /// Returns what the flight of an airplane has cost; nothing where that is not measured.
+    pub(super) fn effort(&self, slot: EntitySlot) -> Option<FlightEffort> {
+        self.efforts.get(slot as usize).map(|effort| *lock(effort))
+    }
+
+    /// Stores what the flight of an airplane has cost.
+    pub(super) fn set_effort(&self, slot: EntitySlot, effort: FlightEffort) {
+        put_memories(&self.efforts, &[slot], vec![effort]);
+    }
+
     /// Returns the present state, which is that after `cycle` cycles: the state itself does not count them.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
         let mut exempt = Vec::new();
@@ -384,6 +399,7 @@ impl AirspaceState {
             orbit_poses: orbits.map(|slot| self.orbit_pose(slot)).collect(),
             external_actions: self.external_actions.iter().map(|one| lock(one).clone()).collect(),
             controls,
+            efforts: self.efforts.iter().map(|one| *lock(one)).collect(),
         }
     }
 

@@ -409,14 +409,18 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
     });
     let rounds = m.rounds_mean.map_or(String::new(), |r| format!(", {r:.1} rounds each"));
     let minima = minima_text(m);
-    vec![
+    let mut lines = vec![
         key_value_pair(
             "arrived",
             format!("{} of {}", group_thousands(m.arrived), group_thousands(m.airplanes)),
         ),
         key_value_pair("nearest approach", nearest),
         key_value_pair("losses of separation", lost),
-        key_value_pair("delay", delay),
+    ];
+    lines.extend(conflicts_text(m));
+    lines.push(key_value_pair("delay", delay));
+    lines.extend(maneuvers_text(m));
+    lines.extend([
         key_value_pair(
             "optimizations",
             format!("{}{rounds}{minima}", group_thousands(m.optimizations)),
@@ -429,7 +433,36 @@ fn flight_metrics_text(m: &Metrics) -> KeyValues {
                 group_thousands(m.shield_orbits)
             ),
         ),
-    ]
+    ]);
+    lines
+}
+
+/// Returns how many conflicts there were, and how they ended; `None` where they are not counted.
+fn conflicts_text(m: &Metrics) -> Option<(String, String)> {
+    let mut text = group_thousands(m.conflicts?);
+    if let Some(rate) = m.intrusion_prevention_rate {
+        text += &format!(", {:.1} % without a loss", 100.0 * rate);
+    }
+    let counts = [
+        (m.well_clear_violations, "violations of well clear"),
+        (m.nmacs, "near mid-air collisions"),
+    ];
+    for (count, what) in counts {
+        if let Some(count) = count.filter(|count| *count > 0) {
+            text += &format!(", {} {what}", group_thousands(count));
+        }
+    }
+    Some(key_value_pair("conflicts", text))
+}
+
+/// Returns how often airplanes left their flight plans, and how much farther they flew; `None` where that is not
+/// measured, or nothing was flown.
+fn maneuvers_text(m: &Metrics) -> Option<(String, String)> {
+    let mut text = format!("{:.1} per flight hour", m.maneuvers_per_flight_hour?);
+    if let Some(percent) = m.mean_extra_distance_percent {
+        text += &format!(", {percent:.1} % farther than alone");
+    }
+    Some(key_value_pair("maneuvers", text))
 }
 
 /// Returns how many optimizations have found a minimum, as far as that is known.

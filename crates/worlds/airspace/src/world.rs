@@ -11,6 +11,7 @@ use super::flight::{
     RoutePosition, SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, actions,
     actions_at_turn_rate, segments_after_orders,
 };
+use super::measures::{FlightEffort, MeasureSettings};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, Objective};
@@ -93,6 +94,8 @@ pub struct AirspaceWorld {
     pub disturbance: Disturbance,
     /// Bounds on those errors for which the shield allows.
     pub bounds: ErrorBounds,
+    /// The measures that a run takes.
+    pub measures: MeasureSettings,
     /// Digest of the scenario's text and seed, by which agents recognize those of the same scenario.
     pub fingerprint: u64,
     pub(crate) streams: Streams,
@@ -106,6 +109,8 @@ pub struct AirspaceWorld {
     pub(crate) top_m_s: Arc<Vec<f64>>,
     /// Seconds that each airplane would need if it were alone.
     pub(crate) alone_s: Arc<Vec<f64>>,
+    /// What each airplane's flight would cost if it were alone; nothing where that is not measured.
+    pub(crate) alone_efforts: Arc<Vec<FlightEffort>>,
     /// The fallbacks that the plans of each airplane may end with, in the order in which they are tried.
     pub(crate) fallbacks: Arc<Vec<Arc<[Fallback]>>>,
     /// The first fallbacks.
@@ -176,7 +181,15 @@ impl AirspaceWorld {
         self.fallbacks =
             Arc::new((0..self.airplanes.len()).map(|i| self.fallback_choices(i)).collect());
         self.curvature_m = self.curvature_error_m();
-        self.alone_s = Arc::new(self.map_airplanes(Self::solo_s));
+        let mut alone_s = Vec::with_capacity(self.airplanes.len());
+        let mut efforts = Vec::with_capacity(self.airplanes.len());
+        for i in 0..self.airplanes.len() {
+            let solo = self.solo_outcome(i);
+            alone_s.push(solo.duration_s);
+            efforts.push(solo.effort);
+        }
+        self.alone_s = Arc::new(alone_s);
+        self.alone_efforts = Arc::new(efforts);
         self
     }
 

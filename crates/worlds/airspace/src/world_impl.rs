@@ -1,6 +1,7 @@
 //! The hooks by which a run asks the world for more than its phases.
 
 use super::decide::OptimizationRecord;
+use super::encounters::{EndedEncounter, SweepBuffers};
 use super::events::Event;
 use super::metric_info::METRIC_INFO;
 use super::metrics::{self, Counters, Metrics};
@@ -83,6 +84,8 @@ pub struct Collector {
     log: EventBuffer<Event>,
     /// Rows as the workers have gathered them.
     pending: WorkerRows,
+    /// Buffers of the search for encounters.
+    sweep: SweepBuffers,
 }
 
 impl World for AirspaceWorld {
@@ -137,11 +140,21 @@ impl World for AirspaceWorld {
         optimizations.sort_unstable_by_key(|one| (one.cycle, one.airplane));
         // Stable, because an airplane may fly several legs in a cycle.
         flown.sort_by_key(FlownLeg::key);
+        let rules = flown.first().map_or(self, |leg| self.with_rules_of(leg.cycle));
+        let mut encounters = Vec::new();
+        let counted = &mut collector.counters.encounters;
+        counted.add_cycle(rules, &flown, &mut collector.sweep, &mut encounters);
         flown.into_iter().for_each(|leg| collector.rows.push_flown_leg(leg));
         for event in events {
             collector.counters.add_event(&event);
             collector.log.push(event);
             collector.rows.push_event(event);
+        }
+        // After the events, which report airplanes beyond the bounds.
+        encounters.sort_unstable_by_key(EndedEncounter::sort_key);
+        for mut encounter in encounters {
+            encounter.is_reported = collector.counters.is_reported(encounter.airplanes);
+            collector.rows.push_encounter(encounter);
         }
         for optimization in optimizations {
             collector.counters.effort.add(&optimization);

@@ -4,6 +4,7 @@ use crate::flight::{
     ConstantRateLeg, FlightConditions, FlightLevelRange, Frame, InterOrderSegment, Point, Pose2,
     RoutePosition, Track,
 };
+use crate::measures::FlightEffort;
 use crate::scratch::PhaseContext;
 use crate::shield::{Fallback, TurnProfile};
 use crate::state::FlightEnd;
@@ -44,6 +45,8 @@ pub(super) struct AircraftCycleMotion<'a> {
     pub(super) legs: Vec<ConstantRateLeg>,
     /// Legs flown in this `dt` in the frame, with times after the start of the run.
     pub(super) flown: Vec<ConstantRateLeg>,
+    /// What its flight has cost; none where that is not measured, or it flies a recorded track.
+    pub(super) effort: Option<FlightEffort>,
     /// Set as soon as its flight has ended: from then on it neither flies nor meets others.
     pub(super) end: Option<FlightEnd>,
 }
@@ -88,6 +91,10 @@ impl<'a> AircraftCycleMotion<'a> {
             }
             FlightPathSource::Track(_) => Cow::default(),
         };
+        let effort = match &path {
+            FlightPathSource::Profile { .. } => state.effort(slot),
+            FlightPathSource::Track(_) => None,
+        };
         Self {
             slot,
             path,
@@ -101,6 +108,7 @@ impl<'a> AircraftCycleMotion<'a> {
             next,
             legs: Vec::new(),
             flown: Vec::new(),
+            effort,
             end: None,
         }
     }

@@ -4,7 +4,8 @@ use super::approaches;
 use super::areas::record_area_times;
 use super::flight::{AircraftCycleMotion, FlightPathSource, SubStep};
 use crate::events::{Event, EventKind};
-use crate::flight::{ConstantRateLeg, Pose2};
+use crate::flight::{ConstantRateLeg, FlightConditions, Pose2};
+use crate::measures::{CourseStep, Maneuvering};
 use crate::metrics::airplane_metrics;
 use crate::purpose;
 use crate::rows::FlownLeg;
@@ -13,6 +14,7 @@ use crate::state::FlightEnd;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::distr::normal;
+use sidestep_kernel::geometry::sub;
 use sidestep_kernel::interrupt;
 use sidestep_kernel::math::wrap_angle;
 
@@ -47,10 +49,13 @@ pub(super) fn fly_sub_steps(
 fn fly(
     world: &AirspaceWorld,
     flight: &mut AircraftCycleMotion<'_>,
-    SubStep { k, step, .. }: SubStep,
+    SubStep { now, k, step, .. }: SubStep,
 ) {
     let air = flight.air;
     let dtau_s = world.timing.dtau_s;
+    if !world.is_non_cooperative(flight.slot, now) {
+        count_maneuver(&air, flight, k);
+    }
     let is_at_end = match &flight.path {
         FlightPathSource::Profile { profile, segment, .. } => {
             let omega = profile.omegas_rad_s[k];
@@ -70,6 +75,31 @@ fn fly(
         }
     };
     flight.end = is_at_end.then_some(FlightEnd::Arrived(step + 1));
+}
+
+/// Counts the maneuver that an airplane begins in the step that it is about to fly, if it begins one.
+fn count_maneuver(air: &FlightConditions, flight: &mut AircraftCycleMotion<'_>, k: usize) {
+    let FlightPathSource::Profile { profile, segment, .. } = &flight.path else { return };
+    let Some(effort) = &mut flight.effort else { return };
+    let omega_rad_s = profile.omegas_rad_s[k];
+    let omega_max_rad_s = segment.model.omega_max_rad_s;
+    let ahead = flight.legs.first().zip(flight.mission.get(flight.next));
+    if let Some((leg, &way_point)) = ahead.filter(|_| !air.has_wind()) {
+        let step = CourseStep {
+            along: leg.direction(),
+            offset_m: sub(way_point, flight.pose.at),
+            omega_rad_s,
+            omega_max_rad_s,
+            dtau_s: air.timing.dtau_s,
+        };
+        if step.is_surely_on_course() {
+            effort.add_planned_step();
+            return;
+        }
+    }
+    let autopilot = air.autopilot(segment.model, &flight.mission);
+    let planned_rad_s = air.steer(&autopilot, flight.pose, flight.next);
+    effort.add_maneuver_step(&Maneuvering { omega_rad_s, planned_rad_s, omega_max_rad_s });
 }
 
 /// Returns the rows of an airplane: its legs, and the position where its flight ended.
@@ -106,6 +136,10 @@ fn store_flight(context: &mut PhaseContext<'_>, flight: AircraftCycleMotion<'_>)
         FlightPathSource::Track(_) => 0.0,
     };
     state.set_turn_rate_rad_s(flight.slot, turn_rate_rad_s);
+    if let Some((mut effort, measures)) = flight.effort.zip(world.measures.flights) {
+        flight.flown.iter().for_each(|leg| effort.add_leg(leg, measures));
+        state.set_effort(flight.slot, effort);
+    }
     // While it orbits, `store_maneuver` has moved the pose along already, without the errors of the flight.
     if current.orbiting.get() == 0 {
         state.set_orbit_pose(

@@ -6,7 +6,7 @@
 //! action.rs  autopilot.rs  air.rs    possible actions, where they lead, in which wind
 //! airplane.rs  order.rs  segment.rs  one airplane, its orders, and the flight between them
 //! track.rs  levels.rs                recorded tracks, and ranges of altitude
-//! leg.rs                             stretches of flight, and how near two of them come
+//! leg.rs  proximity.rs               stretches of flight, how near two of them come, and how deep into each other's zone
 //! surface.rs  pair_plane.rs          a plane or the earth, and the planes in which motions are computed and compared
 //! gusts.rs                           a wind that no airplane knows
 //! chart.rs                           how positions are drawn
@@ -26,6 +26,7 @@ mod order;
 mod pair_plane;
 mod performance;
 mod phase;
+mod proximity;
 mod segment;
 mod surface;
 mod track;
@@ -41,6 +42,7 @@ pub use chart::Chart;
 pub use gusts::Gusts;
 pub(crate) use gusts::MAX_CORRELATION_CYCLES;
 pub use leg::{ConstantRateLeg, PairApproach, SeparationMinima, is_separation_lost};
+pub(crate) use leg::{KinematicState, ROUNDING_M};
 pub use levels::FlightLevelRange;
 pub(crate) use motion::MAX_STEPS_PER_DT;
 pub use motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
@@ -50,6 +52,7 @@ pub(crate) use pair_plane::RigidMotion;
 pub(crate) use performance::GRAVITY_M_S2;
 pub use performance::{Performance, TurnLimit};
 pub use phase::FlightPhase;
+pub(crate) use proximity::{PairZones, Proximity};
 pub(crate) use segment::{InterOrderSegment, SegmentAfterOrder, segments_after_orders};
 pub use surface::{Frame, Surface, coordinates_from_degrees};
 pub use track::{Track, TrackPoint};

@@ -143,6 +143,10 @@ impl<'a> Compiler<'a> {
             error_m: self.error_bounds().position_m,
         };
         detours.apply(&mut airplanes);
+        let mvp = section.mvp.or_default(MVP);
+        let orca = section.orca.or_default(ORCA);
+        // The same for all methods that fly the scenario, so that their conflicts can be compared.
+        let look_ahead_s = timing.horizon_s().max(mvp.look_ahead_s).max(orca.look_ahead_s);
         let world = AirspaceWorld {
             network: self.network(&timing, &airplanes)?,
             wind_m_s: self.wind_m_s(&airplanes)?,
@@ -155,8 +159,8 @@ impl<'a> Compiler<'a> {
             holds_s: section.holds_s.0.clone(),
             legs: self.detour_legs()?,
             method,
-            mvp: section.mvp.or_default(MVP),
-            orca: section.orca.or_default(ORCA),
+            mvp,
+            orca,
             deployment: section.deployment,
             groups: section.groups.as_ref().map(|given| *given.get_ref()).unwrap_or_default(),
             minimum_up_to: section.minimum_up_to.map_or(0, |airplanes| airplanes.get() as usize),
@@ -173,6 +177,7 @@ impl<'a> Compiler<'a> {
             areas,
             disturbance: self.disturbance(),
             bounds: self.error_bounds(),
+            measures: self.measures(look_ahead_s),
             fingerprint: self.recipe.fingerprint(self.seed),
             streams,
             actions: Arc::default(),
@@ -180,6 +185,7 @@ impl<'a> Compiler<'a> {
             orbit_rad_s: Arc::default(),
             top_m_s: Arc::default(),
             alone_s: Arc::default(),
+            alone_efforts: Arc::default(),
             fallbacks: Arc::default(),
             first_fallbacks: Arc::default(),
             teams: Arc::default(),

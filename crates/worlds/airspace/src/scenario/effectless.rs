@@ -43,6 +43,12 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     if section.look_every_s.is_some() && section.legs.is_none() && !looks_anew(compiled) {
         note("look_every_s", "it is for scenarios that fly by mvp, orca or none alone");
     }
+    for key in keys_of_pairs(section) {
+        note(key, "measures.pairs is \"off\"");
+    }
+    if section.measures.lift_to_drag.is_some() && !section.measures.flights.0 {
+        note("measures.lift_to_drag", "measures.flights is \"off\"");
+    }
     if section.error_sigmas.is_some() && has_no_errors(section) {
         note("error_sigmas", "position_noise_m and heading_noise_deg are 0");
     }
@@ -108,6 +114,19 @@ fn optimizer_keys(section: &AirspaceSection) -> Vec<&'static str> {
         ("random_starts", section.random_starts.is_some()),
         ("minimum_up_to", section.minimum_up_to.is_some()),
         ("group_memory_gib", section.group_memory_gib.is_some()),
+    ];
+    given.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key).collect()
+}
+
+/// Returns the keys of measures of pairs that are given, where none are taken.
+fn keys_of_pairs(section: &AirspaceSection) -> Vec<&'static str> {
+    if section.measures.pairs.0 {
+        return Vec::new();
+    }
+    let given = [
+        ("measures.look_ahead_s", section.measures.look_ahead_s.is_some()),
+        ("well_clear", section.well_clear.is_some()),
+        ("nmac", section.nmac.is_some()),
     ];
     given.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key).collect()
 }
@@ -217,6 +236,19 @@ mod tests {
     #[test]
     fn tables_of_types_that_no_airplane_names_are_named() {
         assert_eq!(remarks("openap_folder = \"data\"\n"), ["airspace.openap_folder"]);
+    }
+
+    #[test]
+    fn settings_of_measures_that_are_not_taken_are_named() {
+        let settings = "well_clear = { standard = \"do-365\" }\nnmac = { vertical_m = 20.0 }\n";
+        assert_eq!(remarks(settings), [""; 0]);
+        let off = "measures = { pairs = \"off\", look_ahead_s = 30.0 }\n";
+        assert_eq!(
+            remarks(&format!("{off}{settings}")),
+            ["airspace.measures.look_ahead_s", "airspace.well_clear", "airspace.nmac"]
+        );
+        let off = "measures = { flights = \"off\", lift_to_drag = 12.0 }\n";
+        assert_eq!(remarks(off), ["airspace.measures.lift_to_drag"]);
     }
 
     #[test]

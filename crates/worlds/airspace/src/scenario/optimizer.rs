@@ -94,7 +94,7 @@ impl MvpSection {
 }
 
 /// A time in which an airplane looks ahead.
-type LookAhead = LeftOpen<0, 100_000>;
+pub(super) type LookAhead = LeftOpen<0, 100_000>;
 /// A factor on separations.
 type SeparationFactor = Closed<1, 10>;
 

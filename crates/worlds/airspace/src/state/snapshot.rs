@@ -5,6 +5,7 @@ use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
 use crate::external_action::ExternalAction;
 use crate::flight::Pose2;
+use crate::measures::FlightEffort;
 use crate::pilot::AirplaneControl;
 use crate::shield::Fallback;
 use serde::{Deserialize, Serialize};
@@ -73,6 +74,8 @@ pub struct Snapshot {
     pub external_actions: Vec<Option<ExternalAction>>,
     /// Controls of airplanes for the next cycle, if pilots outside of the run have submitted them.
     pub controls: Option<Vec<AirplaneControl>>,
+    /// What the flight of each airplane has cost, which affects no future; empty unless that is measured.
+    pub efforts: Vec<FlightEffort>,
 }
 
 impl Snapshot {

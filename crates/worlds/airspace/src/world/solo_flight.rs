@@ -1,7 +1,10 @@
-//! Solo flights: how long each airplane would fly if there were no other.
+//! Solo flights: how long each airplane would fly if there were no other, and what that would cost.
 
 use super::AirspaceWorld;
-use crate::flight::{AirplaneStart, InterOrderSegment, Pose2, RoutePosition, Surface};
+use crate::flight::{
+    AirplaneStart, ConstantRateLeg, InterOrderSegment, Pose2, RoutePosition, Surface, distance_m,
+};
+use crate::measures::FlightEffort;
 use sidestep_kernel::{EntitySlot, interrupt};
 
 /// Seconds, or steps where these are longer, after which a flight counts as endless: no flight of a scenario is as
@@ -19,12 +22,22 @@ struct SoloFlight<'a> {
     /// The time at which the method takes it over, in seconds after the start of the run.
     joins_s: f64,
     pose: Pose2,
+    altitude_m: f64,
     orders: u32,
     next: usize,
     /// Number of steps flown, those of straight stretches among them.
     steps: usize,
     /// Whether it flies on forever after its last order.
     ends_on_heading: bool,
+    effort: FlightEffort,
+}
+
+/// The duration and the cost of a solo flight.
+pub(super) struct SoloOutcome {
+    /// Seconds from when the method takes it over; infinite if it would never end.
+    pub(super) duration_s: f64,
+    /// What it costs until then; nothing where that is not measured.
+    pub(super) effort: FlightEffort,
 }
 
 impl SoloFlight<'_> {
@@ -67,15 +80,37 @@ impl SoloFlight<'_> {
         let route = RoutePosition { mission, next: self.next, pose };
         let mission = air.local_mission(frame, model, route, world.timing.dtau_s);
         let straight = air.straight_step_count(&air.autopilot(model, &mission), pose, self.next);
-        self.pose = frame.pose_to_world(air.after_straight_steps(pose, model.v_m_s, straight));
+        let after = air.after_straight_steps(pose, model.v_m_s, straight);
+        if let Some(measures) = world.measures.flights {
+            let flown_s = straight as f64 * world.timing.dtau_s;
+            let ground_m = distance_m(pose.at, after.at);
+            let leg = ConstantRateLeg::new(0.0, flown_s, pose, model.v_m_s, 0.0);
+            self.effort.add_leg_of_length(&leg, ground_m, measures);
+        }
+        self.pose = frame.pose_to_world(after);
         self.steps = self.steps.saturating_add(straight);
+    }
+
+    /// Adds the cost of a step.
+    fn add_step_effort(&mut self, segment: &InterOrderSegment<'_>, pose: Pose2, omega_rad_s: f64) {
+        let world = self.world;
+        let Some(measures) = world.measures.flights else { return };
+        let dtau_s = world.timing.dtau_s;
+        let altitude_m = segment.altitude_after_m(self.altitude_m, dtau_s);
+        let climb_m_s = (altitude_m - self.altitude_m) / dtau_s;
+        let leg = ConstantRateLeg::new(0.0, dtau_s, pose, segment.model.v_m_s, omega_rad_s)
+            .with_climb(self.altitude_m, climb_m_s)
+            .in_wind(world.wind_m_s);
+        self.effort.add_leg(&leg, measures);
+        self.altitude_m = altitude_m;
     }
 
     /// Flies a step, and all those before it in which it certainly flies straight on, at once.
     fn step(&mut self) {
         let world = self.world;
         let air = world.flight_environment();
-        let InterOrderSegment { model, mission, .. } = world.segment(self.slot, self.orders);
+        let segment = world.segment(self.slot, self.orders);
+        let InterOrderSegment { model, mission, .. } = segment;
         let has_no_orders =
             self.airplane.orders.is_empty() && self.airplane.leaves_s == f64::INFINITY;
         let can_skip = has_no_orders && !(world.surface == Surface::Earth && air.has_wind());
@@ -90,6 +125,7 @@ impl SoloFlight<'_> {
         let omega = air.steer(&pilot, before, self.next);
         let after = air.after_wind_step(before.step(model.v_m_s, omega, world.timing.dtau_s));
         let next = pilot.next_way_point((before, after), self.next);
+        self.add_step_effort(&segment, before, omega);
         self.pose = frame.pose_to_world(after);
         // Far from the origin a step may be lost to rounding, and then all later ones are too: the flight is endless.
         let is_stuck = has_no_orders && after == before && self.next == next;
@@ -99,13 +135,12 @@ impl SoloFlight<'_> {
 }
 
 impl AirspaceWorld {
-    /// Returns the seconds that a flight would take alone, from when the method takes it over;
-    /// infinite if it would never end.
-    pub(super) fn solo_s(&self, i: usize) -> f64 {
+    /// Returns how long a flight would take alone, and what it would cost.
+    pub(super) fn solo_outcome(&self, i: usize) -> SoloOutcome {
         let airplane = &self.airplanes[i];
         let joins_s = self.cycle_start_s(self.first_controlled_cycle(i));
         if airplane.track.as_ref().is_some_and(|track| track.end_s() <= joins_s) {
-            return 0.0;
+            return SoloOutcome { duration_s: 0.0, effort: FlightEffort::default() };
         }
         let ends_on_heading =
             airplane.has_fixed_heading(airplane.orders.len()) && airplane.leaves_s == f64::INFINITY;
@@ -115,19 +150,21 @@ impl AirspaceWorld {
             slot: i as EntitySlot,
             joins_s,
             pose: airplane.track.as_ref().map_or(airplane.start, |track| track.pose_at(joins_s)),
+            altitude_m: airplane.altitude_m,
             orders: 0,
             next: 0,
             steps: 0,
             ends_on_heading,
+            effort: FlightEffort::default(),
         };
         for _ in 0..MAX_COMPUTED_STEPS {
             interrupt::check();
             flight.apply_orders();
-            if let Some(ends_s) = flight.end_s() {
-                return ends_s;
+            if let Some(duration_s) = flight.end_s() {
+                return SoloOutcome { duration_s, effort: flight.effort };
             }
             flight.step();
         }
-        f64::INFINITY
+        SoloOutcome { duration_s: f64::INFINITY, effort: flight.effort }
     }
 }
