@@ -35,6 +35,7 @@ mod facts;
 mod fleet;
 pub mod flight;
 mod flight_plan;
+mod flown_leg;
 mod generate;
 mod import;
 mod inspect;

@@ -3,31 +3,11 @@
 use super::decide::OptimizationRecord;
 use super::encounters::EndedEncounter;
 use super::events::{Event, EventKind, EventQuantity};
-use super::flight::{ConstantRateLeg, Pose2};
+use super::flown_leg::FlownLeg;
 use super::settings::RecordSection;
 use super::world::AirspaceWorld;
 use sidestep_kernel::ports::table::label_index;
 use sidestep_kernel::ports::{Table, TableBuffer, TableBuffers, TableRowsBuffer};
-use sidestep_kernel::{Cycle, EntityId};
-
-/// A leg that an airplane has flown in a cycle; at the end of its flight one that takes no time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FlownLeg {
-    pub(super) cycle: Cycle,
-    pub(super) airplane: EntityId,
-    /// The leg, in the frame in which it was flown.
-    pub(super) leg: ConstantRateLeg,
-    /// The pose at its start, in coordinates of the scenario.
-    pub(super) start: Pose2,
-}
-
-impl FlownLeg {
-    /// Returns the sort key of the table's rows. The legs of one airplane in a cycle are gathered
-    /// together, in their order.
-    pub(super) fn key(&self) -> (Cycle, EntityId) {
-        (self.cycle, self.airplane)
-    }
-}
 
 fn trajectories_table(world: &AirspaceWorld) -> Table<FlownLeg> {
     let callsigns = callsigns(world);

@@ -3,9 +3,10 @@
 use super::decide::OptimizationRecord;
 use super::encounters::{EndedEncounter, SweepBuffers};
 use super::events::Event;
+use super::flown_leg::FlownLeg;
 use super::metric_info::METRIC_INFO;
 use super::metrics::{self, Counters, Metrics};
-use super::rows::{FlownLeg, RecordBuffers};
+use super::rows::RecordBuffers;
 use super::scenario::CompiledAirspace;
 use super::scratch::Scratch;
 use super::state::{AirspaceState, Snapshot};

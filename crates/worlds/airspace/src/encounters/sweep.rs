@@ -5,8 +5,8 @@ use crate::flight::{
     ConstantRateLeg, Frame, KinematicState, PairPlane, PairZones, Point, Proximity, RigidMotion,
     SeparationMinima, Surface,
 };
+use crate::flown_leg::FlownLeg;
 use crate::measures::{PairMeasures, RelativeState, WellClearMinima};
-use crate::rows::FlownLeg;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::geometry::{norm_squared, sub};
 use sidestep_kernel::{Cycle, EntityId, math};
@@ -377,7 +377,10 @@ impl FlownAircraft {
         let first = &legs[0];
         let [wind_x, wind_y] = world.wind_m_s;
         let max_speed_m_s = legs.iter().map(|one| one.leg.v_m_s).fold(0.0, f64::max);
+        // One that comes in later is not where it is compared with others.
+        let begins_s = first.leg.from_s - swept.step_s(0);
         let is_steady = legs.len() == 1
+            && begins_s <= ROUNDING * world.timing.dtau_s
             && first.leg.omega_rad_s == 0.0
             && first.leg.climb_m_s == 0.0
             && world.surface == Surface::Plane;
