@@ -147,7 +147,7 @@ proptest! {
     ) {
         let corner = |k: usize| {
             let (sin, cos) = math::sin_cos(std::f64::consts::TAU * k as f64 / 400.0);
-            let radius_m = if k % 2 == 0 { 8000.0 } else { 7000.0 };
+            let radius_m = if k.is_multiple_of(2) { 8000.0 } else { 7000.0 };
             [radius_m * cos, radius_m * sin]
         };
         let shape = AreaShape::from_rings(vec![(0..400).map(corner).collect()]);

@@ -202,8 +202,7 @@ impl Compiler<'_> {
         let levels = match &given.levels_m {
             Some(levels) => {
                 let [low_m, high_m] = levels.get_ref().get();
-                // Comparisons with what is no number are false.
-                if !(low_m < high_m) {
+                if low_m.is_nan() || high_m.is_nan() || low_m >= high_m {
                     let cause = format!("levels from {low_m} to {high_m} m");
                     return error(levels.span(), cause, "give [lowest, highest], in meters");
                 }
