@@ -1,6 +1,7 @@
 //! *Decide*: the choice of actions for the airplanes of a group, by the world's method.
 
 mod around_areas;
+mod deviation_weights;
 mod external;
 mod group_memory;
 mod local_flight;
@@ -8,8 +9,6 @@ mod local_flight;
 mod optima_tests;
 mod preferences;
 mod velocity;
-
-pub(crate) use velocity::TrafficView;
 
 use super::agents::network_traffic::NetworkTraffic;
 use super::agents::{ActionChoice, ReachedCost};

@@ -9,11 +9,9 @@
 //! An airplane of a higher priority has right of way over all of a lower one. Between others it follows from the rules of
 //! the air where the scenario asks for them (ICAO Annex 2, 3.2.2): of two that converge the one that has the other on
 //! its right gives way; one that overtakes gives way; of two head-on neither has right of way. It follows from what all see, so
-//! all agree on it without a word.
+//! all agree on it without a word. `decide/deviation_weights.rs` has the weights of `pc`.
 
 use crate::baseline::AircraftState;
-use crate::decide::TrafficView;
-use crate::flight::KnownAircraft;
 use crate::settings::RightOfWayRule;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::EntitySlot;
@@ -27,10 +25,6 @@ const MAX_OVERTAKING_RAD: f64 = 70.0 * PI / 180.0;
 /// Two whose headings differ from opposite ones by less are head-on, in radians. The rules say "approximately"; 20
 /// degrees is what controllers and simulators use.
 const MAX_HEAD_ON_RAD: f64 = 20.0 * PI / 180.0;
-/// Factor on the cost of deviations of one that has right of way. A deviation of the other by a tenth of the length costs
-/// as much, because costs are squares.
-const DEVIATION_WEIGHT: f64 = 100.0;
-
 /// Which of two airplanes gives way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Yielding {
@@ -114,41 +108,6 @@ impl AirspaceWorld {
         let first = self.airplanes.first().map(|airplane| airplane.priority);
         self.right_of_way != RightOfWayRule::None
             || self.airplanes.iter().any(|airplane| Some(airplane.priority) != first)
-    }
-
-    /// Returns the factor on the cost of deviations of each airplane of a group, by places that all see.
-    ///
-    /// It is that of its priority; and by the rules of the air it is greater for one that has right of way in some conflict,
-    /// and has to give way in none. Conflicts are those of present velocities within the horizon.
-    pub(crate) fn deviation_weights(&self, group: &[KnownAircraft]) -> Vec<f64> {
-        if !self.uses_right_of_way {
-            return vec![1.0; group.len()];
-        }
-        // Only what is filed and seen, so that all compute the same.
-        let filed: Vec<KnownAircraft> =
-            group.iter().map(|known| KnownAircraft { next: 0, orders: 0, ..*known }).collect();
-        let traffic = TrafficView::from_group(self, &filed);
-        let mut has_right = vec![false; group.len()];
-        let mut gives_way = vec![false; group.len()];
-        if self.right_of_way == RightOfWayRule::RulesOfTheAir {
-            for i in 0..group.len() {
-                for j in i + 1..group.len() {
-                    match traffic.yielding_in_conflict(i, j) {
-                        Some(Yielding::First) => (has_right[j], gives_way[i]) = (true, true),
-                        Some(Yielding::Second) => (has_right[i], gives_way[j]) = (true, true),
-                        Some(Yielding::Both) | None => {}
-                    }
-                }
-            }
-        }
-        let priorities: Vec<u8> = filed.iter().map(|known| self.priority(known.slot)).collect();
-        let least = priorities.iter().copied().min().unwrap_or(0);
-        let each = priorities.iter().zip(has_right.iter().zip(gives_way));
-        each.map(|(priority, (has_right, gives_way))| {
-            let further = u8::from(*has_right && !gives_way);
-            (0..priority - least + further).fold(1.0, |weight, _| weight * DEVIATION_WEIGHT)
-        })
-        .collect()
     }
 }
 

@@ -171,7 +171,7 @@ fn decide_steering(
 }
 
 /// The airplanes that a method considers at one time, and the frame of each.
-pub(crate) struct TrafficView<'a> {
+pub(super) struct TrafficView<'a> {
     world: &'a AirspaceWorld,
     all: Vec<AircraftState>,
     frames: Vec<Frame>,
@@ -188,7 +188,7 @@ impl<'a> TrafficView<'a> {
     }
 
     /// Returns the view of a group.
-    pub(crate) fn from_group(world: &'a AirspaceWorld, group: &[KnownAircraft]) -> Self {
+    pub(super) fn from_group(world: &'a AirspaceWorld, group: &[KnownAircraft]) -> Self {
         Self::new(world, group.iter().map(|known| aircraft_state(world, *known)).collect())
     }
 
@@ -209,7 +209,7 @@ impl<'a> TrafficView<'a> {
     }
 
     /// Returns which of two gives way if they are in conflict within the horizon; `None` if they are not.
-    pub(crate) fn yielding_in_conflict(&self, a: usize, b: usize) -> Option<Yielding> {
+    pub(super) fn yielding_in_conflict(&self, a: usize, b: usize) -> Option<Yielding> {
         let settings = self.world.reactive_settings();
         let seen = self.sight(a, b)?;
         mvp::is_in_conflict(&self.all[a], &seen, settings).then(|| self.yielding(a, b))

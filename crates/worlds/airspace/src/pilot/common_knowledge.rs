@@ -1,13 +1,12 @@
 //! The knowledge with which an airplane goes into a conversation: its perceptions, and the filed flights.
 
-use super::common_plans::CommonPlans;
 use super::percept::{OwnshipState, Percept, SurveillanceReport, TrackedState, priority_rank};
 use crate::agents::exchange::{ObservedAircraft, ShieldExchangeSetup};
 use crate::agents::traffic_state::{LastKnownState, OrbitState, StateBeacon, TrafficPicture};
 use crate::agents::{CommonKnowledge, FiledFlight, Ownship};
 use crate::flight::{FlightLevelRange, KnownAircraft, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::shield::{Fallback, OrbitSide, PlanCertainty, ShieldedAircraft};
+use crate::shield::{CommonPlan, Fallback, OrbitSide, PlanCertainty, ShieldedAircraft};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{Cycle, EntityId, math};
 use std::sync::Arc;
@@ -119,14 +118,13 @@ pub(super) fn plan_certainty(world: &AirspaceWorld) -> PlanCertainty {
 }
 
 /// Returns the setup of the shield's exchange, as an airplane sees it: its group, and those nearby that are
-/// `unheard`.
+/// `unheard`. `plans` are those that all compute for its group.
 pub(super) fn shield_exchange_setup(
     world: &AirspaceWorld,
     percept: &Percept,
     unheard: &[SurveillanceReport],
-    plans: &CommonPlans,
+    plans: Vec<Option<CommonPlan>>,
 ) -> ShieldExchangeSetup {
-    let plans = plans.of_group(world, percept);
     let present = percept.group.iter().zip(plans).map(|(one, common)| (one, true, common));
     let others = unheard.iter().map(|one| (one, false, None));
     let mut all: Vec<_> = present.chain(others).collect();

@@ -224,6 +224,7 @@ pub(super) fn shield_exchange_participant(
     config: EndpointConfig,
 ) -> Box<DynParticipant> {
     let PilotKnowledge { world, percept, unheard, contacts, plans } = knowledge;
+    let plans = plans.of_group(world, percept);
     let scene = Arc::new(shield_exchange_setup(world, percept, unheard, plans));
     new_endpoint_participant(
         exchange::ShieldExchangeAgent::new(scene, config.me, profiles, contacts.clone()),
