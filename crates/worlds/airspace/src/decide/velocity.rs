@@ -196,7 +196,8 @@ impl<'a> TrafficView<'a> {
     fn yielding(&self, a: usize, b: usize) -> Yielding {
         let [one, other] = [&self.all[a], &self.all[b]];
         // Nobody has right of way over one that avoids nobody.
-        if !self.world.uses_right_of_way || !(one.yields && other.yields) {
+        let may_give_way = one.yields && other.yields;
+        if !self.world.uses_right_of_way || !may_give_way {
             return Yielding::Both;
         }
         // Always as the one with the smaller slot sees it, so that both come to the same.
