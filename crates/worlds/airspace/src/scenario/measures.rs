@@ -32,6 +32,7 @@ pub(super) struct MeasuresSection {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct WellClearSection {
+    /// The volume that is meant: that of the separation, or of a standard.
     standard: WellClearStandard,
     /// Largest modified tau, in place of that of the standard.
     tau_s: Option<Number<Closed<0, 100_000>>>,

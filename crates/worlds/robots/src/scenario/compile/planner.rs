@@ -6,6 +6,7 @@ use super::super::{
 use super::bodies::{BodyGroup, GroupTeam, action_cycles, period_cycles};
 use super::random::UnlocatedError;
 use super::robots::side_boxes;
+use super::unused_keys::BEHAVIOURS;
 use super::*;
 use crate::belief::Reports;
 use crate::effector::{LEFT, RIGHT, STANDARD_ACTIONS, STAY, Side};
@@ -369,7 +370,10 @@ impl Compiler<'_> {
         }
         let behaviour = s.behaviour.as_ref().map(Spanned::get_ref);
         let kind = behaviour.map_or("wander", |b| b.kind.get_ref().as_str());
-        if !WITH_GOALS.contains(&kind) {
+        // A word that is no behavior is told where it stands.
+        let is_known =
+            BEHAVIOURS.iter().any(|(name, _)| *name == kind) || self.own.contains_key(kind);
+        if is_known && !WITH_GOALS.contains(&kind) {
             let cause = format!(
                 "the planner leads robots that go somewhere, and the behavior of these is `{kind}`"
             );
