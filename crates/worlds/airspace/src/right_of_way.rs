@@ -2,7 +2,8 @@
 //!
 //! | Method | One that has right of way | One that gives way |
 //! |---|---|---|
-//! | `mvp`, `orca` | does not see the other | resolves all of the conflict, not its half |
+//! | `mvp` | does not see the other | resolves the conflict, as it always does |
+//! | `orca` | does not see the other | resolves all of the conflict, not its half |
 //! | `pc` | its deviations cost 100 times as much | |
 //! | shield | of two with different priorities it goes first | |
 //!
@@ -23,8 +24,9 @@ use std::f64::consts::PI;
 /// than 70 degrees by the rules of the air.
 const MAX_OVERTAKING_RAD: f64 = 70.0 * PI / 180.0;
 /// Two whose headings differ from opposite ones by less are head-on, in radians. The rules say "approximately"; 20
-/// degrees is what controllers and simulators use.
+/// degrees is our choice.
 const MAX_HEAD_ON_RAD: f64 = 20.0 * PI / 180.0;
+
 /// Which of two airplanes gives way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Yielding {

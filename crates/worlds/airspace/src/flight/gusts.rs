@@ -14,7 +14,7 @@ use sidestep_kernel::{Cycle, EntitySlot, math};
 use std::sync::Arc;
 
 /// Weight, relative to the first, below which earlier draws no longer count.
-const LEAST_WEIGHT: f64 = 1e-4;
+const MIN_WEIGHT: f64 = 1e-4;
 /// Largest number of cycles in a correlation time: some nine times as many draws make one gust.
 pub(crate) const MAX_CORRELATION_CYCLES: f64 = 100.0;
 
@@ -33,7 +33,7 @@ impl Gusts {
         let ratio = math::exp(-dt_s / correlation_s);
         let mut weights = vec![1.0];
         let mut weight = ratio;
-        while weight >= LEAST_WEIGHT {
+        while weight >= MIN_WEIGHT {
             weights.push(weight);
             weight *= ratio;
         }
