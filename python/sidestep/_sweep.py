@@ -159,15 +159,15 @@ def sweep(
 def compare(
     scenario: str | os.PathLike[str] | Mapping[str, Any] | Scenario,
     *,
-    methods: Sequence[str] = ("pc", "orca", "mvp", "none"),
+    methods: Sequence[str] = ("pc", "orca", "mvp", "bands", "none"),
     runs: int = 10,
     seed: int | None = None,
     workers: int | None = None,
 ) -> Comparison:
     """Compares methods of collision avoidance on the same air traffic, as ``sidestep compare --json`` does.
 
-    ``methods`` are among ``"pc"`` (probability collectives), ``"orca"``, ``"mvp"`` and ``"none"``. Each flies ``runs``
-    times, with consecutive seeds from ``seed`` on (the scenario's). The result has a dict of each method under ``"methods"``:
+    ``methods`` are among ``"pc"`` (probability collectives), ``"orca"``, ``"mvp"``, ``"bands"`` (of detect and
+    avoid) and ``"none"``. Each flies ``runs`` times, with consecutive seeds from ``seed`` on (the scenario's). The result has a dict of each method under ``"methods"``:
     ``losses`` of separation, ``arrived`` (a proportion), ``delay_percent``, ``intrusion_prevention_rate``, ``domino_effect``
     (conflicts beside those of the same traffic without resolution) and others, each with its ``mean``, its 95 %
     ``interval`` and ``n``; ``min_separation_m`` is the minimum over all runs.

@@ -28,7 +28,7 @@ pub(crate) struct CompareArgs {
     workers: WorkersArg,
 
     /// Methods to compare, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = "pc,orca,mvp,none")]
+    #[arg(long, value_delimiter = ',', default_value = "pc,orca,mvp,bands,none")]
     methods: Vec<MethodName>,
 
     /// Number of runs of each method, with consecutive seeds from the scenario's on; where the scenario has a shield, as
@@ -46,6 +46,8 @@ enum MethodName {
     Orca,
     /// Modified voltage potential (MVP)
     Mvp,
+    /// Track bands of detect and avoid, as DAIDALUS computes them
+    Bands,
     /// No avoidance: all airplanes fly straight on
     None,
 }
@@ -56,6 +58,7 @@ impl MethodName {
             Self::Pc => BuiltInMethod::Pc,
             Self::Orca => BuiltInMethod::Orca,
             Self::Mvp => BuiltInMethod::Mvp,
+            Self::Bands => BuiltInMethod::Bands,
             Self::None => BuiltInMethod::None,
         }
     }

@@ -30,9 +30,14 @@ pub(crate) const LOSING: &str = "method = \"none\"\nshield = \"off\"";
 
 #[test]
 fn any_number_of_workers_gives_the_same_bits() {
-    for more in
-        ["", ERRING, "preset = \"paper\"\nmax_rounds = 20", "method = \"orca\"", "method = \"mvp\""]
-    {
+    for more in [
+        "",
+        ERRING,
+        "preset = \"paper\"\nmax_rounds = 20",
+        "method = \"orca\"",
+        "method = \"mvp\"",
+        "method = \"bands\"",
+    ] {
         let source = traffic(more);
         let mut alone = run(&source, 1);
         alone.advance(40);
@@ -91,7 +96,7 @@ fn the_golden_digests_of_the_super_conflict_are_what_every_machine_gets() {
 
 #[test]
 fn with_the_shield_no_method_loses_separation_and_everybody_arrives() {
-    for method in ["pc", "orca", "mvp", "none"] {
+    for method in ["pc", "orca", "mvp", "bands", "none"] {
         for (kind, n) in [("superconflict", 9), ("streams", 9), ("random", 12)] {
             let text = format!(
                 "format = 1\nworld = \"airspace\"\nseed = 3\n[airspace]\nmethod = \"{method}\"\n\

@@ -219,7 +219,7 @@ fn an_unknown_name_is_an_error_with_a_remedy() {
         assert!(at[column - 1..].starts_with(&format!("\"{wrong}\"")), "{at}, column {column}");
     }
     let known = Scenario::parse(&WORLDS, AIRPLANES).check().expect_err("it is not built in");
-    assert_eq!(known.0[0].remedy(), "known are: pc, orca, mvp, none, external");
+    assert_eq!(known.0[0].remedy(), "known are: pc, orca, mvp, bands, none, external");
 }
 
 #[test]

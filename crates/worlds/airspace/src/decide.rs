@@ -147,7 +147,10 @@ impl DecisionStrategy {
 
     /// Returns whether the method gives headings by the positions and goals of all.
     pub(super) fn is_reactive(world: &AirspaceWorld) -> bool {
-        matches!(world.method, MethodKind::Mvp | MethodKind::Orca | MethodKind::Own(_))
+        matches!(
+            world.method,
+            MethodKind::Mvp | MethodKind::Orca | MethodKind::Bands | MethodKind::Own(_)
+        )
     }
 }
 

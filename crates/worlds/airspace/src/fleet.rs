@@ -196,7 +196,11 @@ impl AirspaceWorld {
         }
         let profiles = match self.method {
             // A caller may order any heading, and a reactive method may choose any.
-            MethodKind::Mvp | MethodKind::Orca | MethodKind::External | MethodKind::Own(_) => {
+            MethodKind::Mvp
+            | MethodKind::Orca
+            | MethodKind::Bands
+            | MethodKind::External
+            | MethodKind::Own(_) => {
                 return Ok(());
             }
             MethodKind::Pc | MethodKind::None => possible_profiles(self, own.as_known_aircraft()),

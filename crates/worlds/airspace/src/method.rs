@@ -1,7 +1,7 @@
 //! Methods by which airplanes choose where to fly: the built-in ones, and those of a program's own.
 //!
 //! A method of your own gives each airplane a heading or a turn rate, from what that airplane perceives. It is asked
-//! once per step of `dtau`, as ORCA and MVP are; the airplane turns as fast as it can, and the shield, where it is on,
+//! once per step of `dtau`, as ORCA, MVP and track bands are; the airplane turns as fast as it can, and the shield, where it is on,
 //! filters the result as it does that of any method.
 
 use crate::baseline::AircraftState;
@@ -87,6 +87,8 @@ pub enum MethodKind {
     Orca,
     /// Modified voltage potential.
     Mvp,
+    /// Track bands, as DAIDALUS computes them.
+    Bands,
     /// Straight to the way-point, without regard to others.
     None,
     /// The orders of a caller of the library; without them, the flight plan.
@@ -131,6 +133,7 @@ impl MethodKind {
             Self::Pc => BuiltInMethod::Pc.name(),
             Self::Orca => BuiltInMethod::Orca.name(),
             Self::Mvp => BuiltInMethod::Mvp.name(),
+            Self::Bands => BuiltInMethod::Bands.name(),
             Self::None => BuiltInMethod::None.name(),
             Self::External => BuiltInMethod::External.name(),
             Self::Own(own) => &own.name,
@@ -144,6 +147,7 @@ impl From<BuiltInMethod> for MethodKind {
             BuiltInMethod::Pc => Self::Pc,
             BuiltInMethod::Orca => Self::Orca,
             BuiltInMethod::Mvp => Self::Mvp,
+            BuiltInMethod::Bands => Self::Bands,
             BuiltInMethod::None => Self::None,
             BuiltInMethod::External => Self::External,
         }

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `mvp` | does not see the other | resolves the conflict, as it always does |
 //! | `orca` | does not see the other | resolves all of the conflict, not its half |
+//! | `bands` | does not see the other | keeps out of its bands, as it always does |
 //! | `pc` | its deviations cost 100 times as much | |
 //! | shield | of two with different priorities it goes first | |
 //!
@@ -185,7 +186,7 @@ mod tests {
 
     #[test]
     fn with_every_method_the_one_from_the_right_keeps_its_way() {
-        for method in ["pc", "mvp", "orca"] {
+        for method in ["pc", "mvp", "orca", "bands"] {
             for shield in ["on", "off"] {
                 let keys = format!(
                     "method = \"{method}\"\nshield = \"{shield}\"\nright_of_way = \"rules-of-the-air\""
@@ -200,7 +201,7 @@ mod tests {
 
     #[test]
     fn a_higher_priority_has_right_of_way_whatever_the_rules() {
-        for method in ["pc", "mvp", "orca"] {
+        for method in ["pc", "mvp", "orca", "bands"] {
             for rule in ["", "right_of_way = \"rules-of-the-air\"\n"] {
                 let keys = format!("method = \"{method}\"\n{rule}");
                 let (strayed_m, _) = crossing(&keys, ["priority = 1", ""]);

@@ -92,7 +92,7 @@ struct AirspaceSection {
     generator: Option<Spanned<GeneratorSection>>,
     dt_s: Option<Spanned<Number<Decision>>>,
     dtau_s: Option<Spanned<Number<Step>>>,
-    /// Seconds between two looks of mvp, orca and none, in place of dt_s and dtau_s.
+    /// Seconds between two looks of mvp, orca, bands and none, in place of dt_s and dtau_s.
     look_every_s: Option<Spanned<Number<Step>>>,
     horizon_s: Option<Spanned<Number<LookAhead>>>,
     /// The former key, which counted points; only its error is left.
@@ -114,6 +114,7 @@ struct AirspaceSection {
     changes: Vec<Spanned<RuleChangeSection>>,
     mvp: MvpSection,
     orca: ReactiveSection,
+    bands: ReactiveSection,
     estimator: Option<Spanned<Estimator>>,
     update: Option<Spanned<Update>>,
     order: Option<UpdateOrder>,

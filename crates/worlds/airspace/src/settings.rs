@@ -26,6 +26,8 @@ pub enum BuiltInMethod {
     Orca,
     /// Modified voltage potential.
     Mvp,
+    /// Track bands, as DAIDALUS computes them.
+    Bands,
     /// Straight to the way-point, without regard to others.
     None,
     /// Follows the orders of a caller of the library; without them, its flight plan.
@@ -34,7 +36,7 @@ pub enum BuiltInMethod {
 
 impl BuiltInMethod {
     /// The methods by which airplanes decide themselves.
-    pub const ALL: [Self; 4] = [Self::Pc, Self::Orca, Self::Mvp, Self::None];
+    pub const ALL: [Self; 5] = [Self::Pc, Self::Orca, Self::Mvp, Self::Bands, Self::None];
 
     /// Returns its name in files.
     pub fn name(self) -> &'static str {
@@ -42,6 +44,7 @@ impl BuiltInMethod {
             Self::Pc => "pc",
             Self::Orca => "orca",
             Self::Mvp => "mvp",
+            Self::Bands => "bands",
             Self::None => "none",
             Self::External => "external",
         }

@@ -38,6 +38,8 @@ const LOOK_EVERY_S: f64 = 1.0;
 /// of 1.5 m radius look ahead 10 s, in which they fly 6.7 radii; airliners fly as many radii of 2.5 nautical miles in
 /// 140 s. The 45 s of scenarios in the paper's size are as many for its airplanes, and too few for airliners.
 const ORCA_LOOK_AHEAD_S: f64 = 150.0;
+/// Look-ahead of track bands in seconds, unless a file gives a shorter one: DAIDALUS's own (`lookahead_time`).
+const BANDS_LOOK_AHEAD_S: f64 = 180.0;
 /// Look-ahead of MVP in seconds in a BlueSky file, unless that gives one: BlueSky's own (`asas_dtlookahead`).
 const MVP_LOOK_AHEAD_S: f64 = 300.0;
 
@@ -64,6 +66,7 @@ fn header_text(name: &str, zone: SeparationMinima, horizon_s: Option<f64>, more:
     // Airliners fly seven times as fast as the paper's airplanes and turn more slowly, so all times are longer.
     let horizon_s = horizon_s.unwrap_or(300.0);
     let orca_s = horizon_s.min(ORCA_LOOK_AHEAD_S);
+    let bands_s = horizon_s.min(BANDS_LOOK_AHEAD_S);
     // Rust's own escapes are not those of TOML: an accent of its own would be `\u{301}`.
     let name = toml::Value::from(name);
     format!(
@@ -71,6 +74,7 @@ fn header_text(name: &str, zone: SeparationMinima, horizon_s: Option<f64>, more:
          [airspace]\nvertical_m = {vertical_m:?}\nhorizon_s = {horizon_s:?}\ndt_s = {DT_S:?}\ndtau_s = 5.0\n\
          look_every_s = {LOOK_EVERY_S:?}\npasses_abeam = true\n\
          orca = {{ look_ahead_s = {orca_s:?} }}\n\
+         bands = {{ look_ahead_s = {bands_s:?} }}\n\
          legs = {{ turns_s = [20.0, 40.0, 60.0], until_s = [240.0] }}\n{more}\n[airplane]\nseparation_m = {gap_m:?}\n"
     )
 }

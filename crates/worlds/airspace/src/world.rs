@@ -51,6 +51,8 @@ pub struct AirspaceWorld {
     pub mvp: ReactiveSettings,
     /// Settings of ORCA; without effect on other methods.
     pub orca: ReactiveSettings,
+    /// Settings of track bands; without effect on other methods.
+    pub bands: ReactiveSettings,
     /// The deployment of the optimizer.
     pub deployment: Deployment,
     /// How its agents learn their groups.
@@ -420,6 +422,7 @@ impl AirspaceWorld {
         match self.method {
             MethodKind::Mvp => self.mvp,
             MethodKind::Orca => self.orca,
+            MethodKind::Bands => self.bands,
             MethodKind::Pc | MethodKind::None | MethodKind::External | MethodKind::Own(_) => {
                 ReactiveSettings {
                     look_ahead_s: self.timing.horizon as f64 * self.timing.dtau_s,

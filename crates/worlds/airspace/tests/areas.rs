@@ -5,7 +5,7 @@ use sidestep_kernel::Simulation;
 use sidestep_scenario::{Source, WorldType};
 use std::path::Path;
 
-const METHODS: [&str; 4] = ["pc", "mvp", "orca", "none"];
+const METHODS: [&str; 5] = ["pc", "mvp", "orca", "bands", "none"];
 
 fn run(text: &str, workers: usize) -> AirspaceRun {
     airspace_run(&Source::new("areas", text, ""), workers).expect("a scenario")

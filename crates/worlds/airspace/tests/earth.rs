@@ -160,7 +160,7 @@ fn what_happens_in_the_north_does_not_depend_on_who_flies_in_the_south() {
         Flight { at_deg: [62.1, 6.2], azimuth_deg: 250.0, ahead_m: 90_000.0 },
     ];
     let far = Flight { at_deg: [-33.0, 18.0], azimuth_deg: 10.0, ahead_m: 90_000.0 };
-    for method in ["pc", "mvp", "orca", "none"] {
+    for method in ["pc", "mvp", "orca", "bands", "none"] {
         let airspace =
             format!("method = \"{method}\"\ndt_s = 10.0\ndtau_s = 5.0\nhorizon_s = 120.0");
         let text = |flights: &[Flight]| {

@@ -1,6 +1,7 @@
 //! Other methods under the same limits, for comparison: each considers the airplanes near it once per
 //! step of `dtau`, and gives a heading, toward which the airplane turns as fast as it can.
 
+pub(super) mod bands;
 pub(super) mod mvp;
 pub(super) mod orca;
 

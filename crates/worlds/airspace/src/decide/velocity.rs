@@ -1,4 +1,4 @@
-//! Candidates by a method that steers each airplane: ORCA, MVP, or one of the program's own.
+//! Candidates by a method that steers each airplane: ORCA, MVP, track bands, or one of the program's own.
 //!
 //! Such a method considers the airplanes around it all the time: once per step of `dtau`, as its
 //! authors fly it, and not once per `dt`. So the preferred profile of a `dt` is found by flying the group ahead,
@@ -7,7 +7,7 @@
 use super::around_areas::{SteeredAircraft, has_areas_ahead, steer_around_areas};
 use super::local_flight::LocalFlight;
 use super::preferences::{rank_by_turn_difference, turn_profiles_from_actions};
-use crate::baseline::{AircraftState, mvp, orca};
+use crate::baseline::{AircraftState, bands, mvp, orca};
 use crate::flight::{Frame, InterOrderSegment, KnownAircraft, Point, Pose2, Surface};
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
 use crate::non_cooperative::NonCooperativeAircraft;
@@ -143,6 +143,17 @@ fn decide_steering(
                 let others = view.others_seen_from(place);
                 let heading_rad =
                     orca::heading_rad(own, others.iter(), world.orca, world.timing.dtau_s);
+                steering[k] = heading_rad.into();
+            }
+        }
+        MethodKind::Bands => {
+            for (place, &k) in flying.iter().enumerate() {
+                let own = &view.all[place];
+                let others = view.others_seen_from(place);
+                let omega_max_rad_s =
+                    world.segment(group[k].slot, group[k].orders).model.omega_max_rad_s;
+                let heading_rad =
+                    bands::heading_rad(own, others.iter(), world.bands, omega_max_rad_s);
                 steering[k] = heading_rad.into();
             }
         }

@@ -91,7 +91,7 @@ fn one_process_that_decides_for_all_hears_nobody() {
 
 #[test]
 fn every_method_decides_alike_whether_groups_are_heard_or_announced() {
-    for method in ["mvp", "orca", "none"] {
+    for method in ["mvp", "orca", "bands", "none"] {
         is_alike(
             &scenario(&format!("deployment = \"team\"\nmethod = \"{method}\""), NON_COOPERATIVE),
             20,

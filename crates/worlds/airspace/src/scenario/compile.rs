@@ -39,6 +39,9 @@ const MVP: ReactiveSettings =
 /// Settings with which ORCA loses no separation there, at the smallest delay.
 const ORCA: ReactiveSettings =
     ReactiveSettings { look_ahead_s: 45.0, margin: 1.05, resolution_factor: 1.0 };
+/// Settings with which track bands lose no separation there, at the smallest delay.
+const BANDS: ReactiveSettings =
+    ReactiveSettings { look_ahead_s: 90.0, margin: 1.05, resolution_factor: 1.0 };
 /// Standard deviations of errors for which the shield allows, unless the scenario gives a number: of normal errors one
 /// in 1.7 million is larger.
 const DEFAULT_SIGMAS: f64 = 5.0;
@@ -145,8 +148,12 @@ impl<'a> Compiler<'a> {
         detours.apply(&mut airplanes);
         let mvp = section.mvp.or_default(MVP);
         let orca = section.orca.or_default(ORCA);
+        let bands = section.bands.or_default(BANDS);
         // The same for all methods that fly the scenario, so that their conflicts can be compared.
-        let look_ahead_s = timing.horizon_s().max(mvp.look_ahead_s).max(orca.look_ahead_s);
+        let look_ahead_s = [mvp, orca, bands]
+            .iter()
+            .map(|settings| settings.look_ahead_s)
+            .fold(timing.horizon_s(), f64::max);
         let world = AirspaceWorld {
             network: self.network(&timing, &airplanes)?,
             wind_m_s: self.wind_m_s(&airplanes)?,
@@ -161,6 +168,7 @@ impl<'a> Compiler<'a> {
             method,
             mvp,
             orca,
+            bands,
             deployment: section.deployment,
             groups: section.groups.as_ref().map(|given| *given.get_ref()).unwrap_or_default(),
             minimum_up_to: section.minimum_up_to.map_or(0, |airplanes| airplanes.get() as usize),
@@ -383,7 +391,13 @@ impl<'a> Compiler<'a> {
     /// Returns whether all methods of the scenario look anew each time, and plan nothing.
     fn looks_anew(&self) -> bool {
         let is_reactive = |method: BuiltInMethod| {
-            matches!(method, BuiltInMethod::Mvp | BuiltInMethod::Orca | BuiltInMethod::None)
+            matches!(
+                method,
+                BuiltInMethod::Mvp
+                    | BuiltInMethod::Orca
+                    | BuiltInMethod::Bands
+                    | BuiltInMethod::None
+            )
         };
         let section = &self.file.airspace;
         let starts_so = match &section.method {

@@ -24,12 +24,13 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
         for key in optimizer_keys(section) {
             note(key, "no airplane avoids others by method pc");
         }
-        // The look-ahead and the margin of all methods but these two are those of the predictions.
-        let has_own_margin =
-            |method: &MethodKind| matches!(method, MethodKind::Mvp | MethodKind::Orca);
+        // The look-ahead and the margin of all methods but these three are those of the predictions.
+        let has_own_margin = |method: &MethodKind| {
+            matches!(method, MethodKind::Mvp | MethodKind::Orca | MethodKind::Bands)
+        };
         let mut rules = compiled.world.all_rules();
         if section.inflation.is_some() && rules.all(|rules| has_own_margin(&rules.method)) {
-            note("inflation", "all airplanes avoid others by method mvp or orca");
+            note("inflation", "all airplanes avoid others by method mvp, orca or bands");
         }
     }
     let is_for_both = section.look_every_s.is_some() && section.legs.is_some();
@@ -40,8 +41,14 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     {
         note("orca", "no airplane avoids others by method orca");
     }
+    if !is_for_both
+        && section.bands.is_given()
+        && !uses(|method| matches!(method, MethodKind::Bands))
+    {
+        note("bands", "no airplane avoids others by method bands");
+    }
     if section.look_every_s.is_some() && section.legs.is_none() && !looks_anew(compiled) {
-        note("look_every_s", "it is for scenarios that fly by mvp, orca or none alone");
+        note("look_every_s", "it is for scenarios that fly by mvp, orca, bands or none alone");
     }
     for key in keys_of_pairs(section) {
         note(key, "measures.pairs is \"off\"");
@@ -134,7 +141,12 @@ fn keys_of_pairs(section: &AirspaceSection) -> Vec<&'static str> {
 /// Returns whether all methods of a scenario look anew each time, and plan nothing.
 fn looks_anew(compiled: &CompiledAirspace) -> bool {
     let mut rules = compiled.world.all_rules();
-    rules.all(|rules| matches!(rules.method, MethodKind::Mvp | MethodKind::Orca | MethodKind::None))
+    rules.all(|rules| {
+        matches!(
+            rules.method,
+            MethodKind::Mvp | MethodKind::Orca | MethodKind::Bands | MethodKind::None
+        )
+    })
 }
 
 fn has_no_errors(section: &AirspaceSection) -> bool {
@@ -161,13 +173,14 @@ mod tests {
         let optimizer = "alpha = 0.1\ncooling = 0.5\nmax_rounds = 3\n";
         assert_eq!(remarks(optimizer), [""; 0]);
         let keys = ["alpha", "cooling", "max_rounds"].map(|key| format!("airspace.{key}"));
-        for method in ["none", "mvp", "orca", "external"] {
+        for method in ["none", "mvp", "orca", "bands", "external"] {
             assert_eq!(remarks(&format!("method = \"{method}\"\n{optimizer}")), keys, "{method}");
         }
         let mvp = "mvp = { margin = 1.3 }\n";
         assert_eq!(remarks(mvp), ["airspace.mvp"]);
         assert_eq!(remarks(&format!("method = \"mvp\"\n{mvp}")), [""; 0]);
         assert_eq!(remarks("orca = { look_ahead_s = 20.0 }\n"), ["airspace.orca"]);
+        assert_eq!(remarks("bands = { look_ahead_s = 20.0 }\n"), ["airspace.bands"]);
         assert_eq!(remarks("look_every_s = 5.0\n"), ["airspace.look_every_s"]);
         assert_eq!(remarks("method = \"none\"\nlook_every_s = 5.0\n"), [""; 0]);
     }
@@ -175,7 +188,7 @@ mod tests {
     #[test]
     fn actions_have_an_effect_with_every_method() {
         let actions = "holds_s = [2.0]\nlegs = { turns_s = [20.0], until_s = [80.0] }\n";
-        for method in ["pc", "none", "mvp", "orca", "external"] {
+        for method in ["pc", "none", "mvp", "orca", "bands", "external"] {
             assert_eq!(remarks(&format!("method = \"{method}\"\n{actions}")), [""; 0], "{method}");
         }
     }
@@ -183,7 +196,7 @@ mod tests {
     #[test]
     fn a_margin_of_predictions_has_no_effect_beside_methods_with_margins_of_their_own() {
         for (method, is_named) in
-            [("none", false), ("external", false), ("mvp", true), ("orca", true)]
+            [("none", false), ("external", false), ("mvp", true), ("orca", true), ("bands", true)]
         {
             let found = remarks(&format!("method = \"{method}\"\ninflation = 1.3\n"));
             assert_eq!(found == ["airspace.inflation"], is_named, "{method}: {found:?}");

@@ -129,7 +129,7 @@ impl Compiler<'_> {
             return error("a shield that is switched on", remedy);
         }
         if section.method == Some(BuiltInMethod::External) {
-            let remedy = "give pc, orca, mvp or none";
+            let remedy = "give pc, orca, mvp, bands or none";
             return error("airplanes that begin to follow orders of a caller", remedy);
         }
         if let Some(method) = section.method {

@@ -100,7 +100,7 @@ fn only_named_ones_enter(
     Ok(run)
 }
 
-const METHODS: [&str; 4] = ["none", "mvp", "orca", "pc"];
+const METHODS: [&str; 5] = ["none", "mvp", "orca", "bands", "pc"];
 
 fn some_method() -> impl Strategy<Value = &'static str> {
     prop::sample::select(METHODS.to_vec())
@@ -219,7 +219,7 @@ fn all_deployments_keep_clear_of_areas_alike() {
             assert_eq!(digest(deployment, more), digest("direct", more), "{deployment} {more}");
         }
     }
-    for method in ["mvp", "orca", "none"] {
+    for method in ["mvp", "orca", "bands", "none"] {
         let more = format!("method = \"{method}\"");
         assert_eq!(digest("team", &more), digest("direct", &more), "{method}");
     }

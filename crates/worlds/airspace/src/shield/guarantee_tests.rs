@@ -200,7 +200,7 @@ fn every_method_passes_a_recorded_and_a_silent_airplane_at_the_separation() {
     let own = plane([-8000.0, 3.0], 0.0, [8000.0, 3.0], "");
     let recorded = track([8000.0, 0.0], [-8000.0, 0.0], 0.0, 35.0, 0.0);
     let silent = plane([8000.0, 0.0], 180.0, [-8000.0, 0.0], "intruder = true");
-    for method in ["pc", "orca", "mvp", "none"] {
+    for method in ["pc", "orca", "mvp", "bands", "none"] {
         for other in [&recorded, &silent] {
             let mut run = run(&format!("method = \"{method}\""), &format!("{own}{other}"));
             run.advance(200);

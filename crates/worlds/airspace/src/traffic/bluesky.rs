@@ -384,7 +384,7 @@ mod tests {
 
     /// With the 45 s that airplanes of the paper look ahead, airliners lose separation here.
     #[test]
-    fn imported_flights_keep_apart_by_orca_alone() {
+    fn imported_flights_keep_apart_by_orca_or_bands_alone() {
         let flights = [
             ("00:00", "NOR01,A320,52.7,4.0,180", "51.3,4.0"),
             ("00:00", "SOU02,B738,51.3,4.0,0", "52.7,4.0"),
@@ -397,13 +397,15 @@ mod tests {
             format!("00:{time}>CRE {flight},FL300,270\n00:{time}>ADDWPT {name},{goal}\n")
         });
         let text = from_bluesky("five", &parse(&"five.scn", &lines.concat()));
-        let set = ["airspace.method=\"orca\"", "airspace.shield=\"off\""].map(String::from);
         let source = Source::new("five", text.expect("it has aircraft"), "");
-        let source = source.with_overrides(&set).expect("known keys");
-        let mut run = airspace_run(&source, 1).expect("a scenario");
-        run.advance(run.config().cycles);
-        let metrics = run.metrics();
-        assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 5));
+        for method in ["orca", "bands"] {
+            let set = [format!("airspace.method={method:?}"), "airspace.shield=\"off\"".into()];
+            let source = source.clone().with_overrides(&set).expect("known keys");
+            let mut run = airspace_run(&source, 1).expect("a scenario");
+            run.advance(run.config().cycles);
+            let metrics = run.metrics();
+            assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 5), "{method}");
+        }
     }
 
     /// Losses of separation, and the nearest approach in meters, of two that meet head on after 7 minutes.

@@ -56,7 +56,7 @@ fn is_flown_alike(airspace: &str, airplanes: &str, mut orders: impl FnMut(&mut A
 #[test]
 fn a_run_flown_from_outside_is_the_run_that_flies_itself() {
     for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {
-        for method in ["pc", "mvp", "orca", "none"] {
+        for method in ["pc", "mvp", "orca", "bands", "none"] {
             let airspace = format!("deployment = \"{deployment}\"\nmethod = \"{method}\"");
             is_flown_alike(&airspace, FOUR, |_| {});
         }
@@ -113,7 +113,7 @@ fn what_was_ordered_from_outside_is_in_the_sight() {
 #[test]
 fn everybody_filters_as_one_process_does_to_the_bit() {
     let noise = "position_noise_m = 5.0\nheading_noise_deg = 0.05\nwind_m_s = [3.0, 1.0]";
-    for method in ["pc", "mvp", "orca", "none"] {
+    for method in ["pc", "mvp", "orca", "bands", "none"] {
         for more in ["", noise] {
             let digest = |deployment: &str| {
                 let airspace =
