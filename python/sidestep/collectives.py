@@ -60,7 +60,7 @@ def minimize(
     calm_rounds: int = 3,
     max_rounds: int = 500,
     choice: Literal["argmax", "draw"] = "argmax",
-    local_search: Literal["none", "pairs"] | None = None,
+    local_search: Literal["none", "pairs", "branch-and-bound"] | None = None,
     random_starts: int = 8,
     seed: int = 0,
 ) -> MinimizeResult:
@@ -77,8 +77,9 @@ def minimize(
     influence. The temperature falls by ``cooling``
     a round, until no probability moves by more than ``threshold`` in ``calm_rounds`` rounds, or after ``max_rounds``. Costs should be
     of the order of 1. For sums, a local search follows (``"pairs"``): moves of one or two players while they save anything,
-    from there, from each player's cheapest strategy alone, and from ``random_starts`` joint strategies. The same arguments
-    and ``seed`` give the same bits.
+    from there, from each player's cheapest strategy alone, and from ``random_starts`` joint strategies. After it
+    ``"branch-and-bound"`` finds the true minimum, unless it takes too long: then ``bound`` is below ``cost``. The same
+    arguments and ``seed`` give the same bits.
 
     Raises InputError when shapes do not match, or a setting is out of range; and any exception of the objective.
 

@@ -94,7 +94,11 @@ impl MinimizeOptions {
             local_search: choose(
                 "local_search",
                 &self.local_search,
-                &[("none", LocalSearch::None), ("pairs", LocalSearch::Pairs)],
+                &[
+                    ("none", LocalSearch::None),
+                    ("pairs", LocalSearch::Pairs),
+                    ("branch-and-bound", LocalSearch::BranchAndBound),
+                ],
             )?,
             random_starts: self.random_starts,
         })

@@ -28,6 +28,8 @@ pub enum LocalSearch {
     None,
     /// Moves of one or two players, until none saves anything.
     Pairs,
+    /// The same, and then branch and bound: the true minimum, unless it takes too long.
+    BranchAndBound,
 }
 
 /// New strategies of a player, and maybe of a later one.
@@ -457,6 +459,13 @@ impl PairwiseGame {
                 given.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost);
             }
         }
+    }
+
+    /// Returns the cost that each strategy of a player has beside the strategies of the others, up to a constant.
+    pub(super) fn costs_given(&self, player: usize, joint: &[usize]) -> Vec<f64> {
+        let mut costs = PlayerCosts::default();
+        self.write_player_costs(player, joint, &mut costs);
+        costs.given
     }
 
     /// Returns a player's part of a lower bound on the cost of every joint move: the sum of the parts of all players is

@@ -12,7 +12,7 @@ use sidestep_airspace::flight::{
 use sidestep_airspace::objective::{ActionPredictions, Objective, build_group_game};
 use sidestep_collectives::{
     Choice, Estimator, Game, LocalSearch, OptimizerConfig, PairwiseGame, StopCriterion, Update,
-    UpdateOrder, Utility, find_minimum, optimize,
+    UpdateOrder, Utility, find_minimum, optimize, tight_lower_bound,
 };
 use sidestep_kernel::Seed;
 use sidestep_kernel::math::{cos, sin};
@@ -24,7 +24,9 @@ const GAMES: u32 = 60;
 /// Restarts of pair moves that stand for the minimum where branch and bound takes too long.
 const RESTARTS: u32 = 2_000;
 /// Partial joint actions that branch and bound looks at in a game.
-const MAX_NODES: u64 = 300_000;
+const MAX_NODES: u64 = 100_000;
+/// Added to both costs of a ratio, which has no sense where the least cost is 0.
+const TINY: f64 = 1e-6;
 
 const TIMING: TimeDiscretization = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
 
@@ -329,6 +331,7 @@ fn algorithms<'a>() -> Vec<Algorithm<'a>> {
     vec![
         ("rounds alone", Box::new(ours(LocalSearch::None, 0))),
         ("rounds and local search (default)", Box::new(ours(LocalSearch::Pairs, 8))),
+        ("and branch and bound", Box::new(ours(LocalSearch::BranchAndBound, 8))),
         ("best response, 20 starts", {
             Box::new(|game| best_responses(&Network::new(game), &mut draws(0, 0, 3), 20))
         }),
@@ -337,18 +340,54 @@ fn algorithms<'a>() -> Vec<Algorithm<'a>> {
     ]
 }
 
-/// Returns the least cost of a game that is known, and whether it is proved.
-fn least_cost(game: &PairwiseGame, found: &[Vec<usize>]) -> (f64, bool) {
-    let restarts = settings(LocalSearch::Pairs, RESTARTS);
-    let mut best = optimize(game, &restarts, uniform).joint;
-    for joint in found {
-        if game.cost(joint) < game.cost(&best) {
-            best.clone_from(joint);
+/// How tight the lower bounds are, and how long the search for the minimum takes from the default's joint action.
+#[derive(Default)]
+struct Bounds {
+    /// The bound that every optimization tells, relative to the least cost known.
+    told: Vec<f64>,
+    tight: Vec<f64>,
+    minimum_s: Vec<f64>,
+    proved: u32,
+}
+
+impl Bounds {
+    /// Adds a game, and returns the least cost that is known. `found` are joint actions, that of the default second.
+    fn add(&mut self, game: &PairwiseGame, found: &[Vec<usize>]) -> f64 {
+        let started = ProcessTime::now();
+        let minimum = find_minimum(game, &found[1], MAX_NODES);
+        self.minimum_s.push(started.elapsed().as_secs_f64());
+        self.proved += u32::from(minimum.is_proved);
+        let mut least = minimum.cost;
+        if !minimum.is_proved {
+            let restarts = settings(LocalSearch::Pairs, RESTARTS);
+            least = least.min(optimize(game, &restarts, uniform).cost);
+            least = found.iter().fold(least, |least, joint| least.min(game.cost(joint)));
         }
+        let share = |bound: f64| (bound + TINY) / (least + TINY);
+        self.told.push(share(game.lower_bound()));
+        self.tight.push(share(tight_lower_bound(game, &found[1])));
+        least
     }
-    match find_minimum(game, &best, MAX_NODES) {
-        Some(minimum) => (minimum.cost, true),
-        None => (game.cost(&best), false),
+
+    fn print(&mut self) {
+        let Self { told, tight, minimum_s, proved } = self;
+        for all in [&mut *told, tight, minimum_s] {
+            all.sort_by(f64::total_cmp);
+        }
+        let count = told.len();
+        println!(
+            "  bound over the least: told {:.3}, tight {:.3} in the median, {:.3} and {:.3} in one of ten",
+            told[count / 2],
+            tight[count / 2],
+            told[count / 10],
+            tight[count / 10],
+        );
+        println!(
+            "  minimum proved in {proved} of {count}: median {:.3} ms, 90 % {:.3} ms, longest {:.1} ms",
+            1e3 * minimum_s[count / 2],
+            1e3 * minimum_s[count * 9 / 10],
+            1e3 * minimum_s[count - 1],
+        );
     }
 }
 
@@ -367,7 +406,7 @@ fn main() {
         let all = algorithms();
         let mut reached: Vec<Reached> =
             all.iter().map(|(name, _)| Reached { name, ..Reached::default() }).collect();
-        let mut proved = 0;
+        let mut bounds = Bounds::default();
         // Games in which nobody meets have nothing to find.
         let games = (0..).map(|number| random_game(n, number));
         let games = games.filter(|game| game.pair_costs().next().is_some()).take(GAMES as usize);
@@ -378,19 +417,17 @@ fn main() {
                 found.push(run(&game));
                 reached.cpu_s += started.elapsed().as_secs_f64();
             }
-            let (least, is_proved) = least_cost(&game, &found);
-            proved += u32::from(is_proved);
+            let least = bounds.add(&game, &found);
             for (joint, reached) in found.iter().zip(&mut reached) {
-                // A ratio has no sense where the least cost is 0.
-                const TINY: f64 = 1e-6;
                 reached.ratios.push((game.cost(joint) + TINY) / (least + TINY));
             }
             if games_file.is_some() {
                 written.push(game_json(&game, least));
             }
         }
-        println!("{n} airplanes, {GAMES} games, the least cost proved in {proved}:");
+        println!("{n} airplanes, {GAMES} games:");
         reached.iter_mut().for_each(Reached::print);
+        bounds.print();
     }
     if let Some(file) = games_file {
         let text = serde_json::to_vec(&written).expect("plain data");

@@ -126,7 +126,7 @@ struct AirspaceSection {
     /// Number of random starts of the local search.
     random_starts: Option<Spanned<Integer<0, 100>>>,
     /// The true minimum of the objective is recorded for groups of up to this many airplanes.
-    minimum_up_to: Option<Integer<0, 8>>,
+    minimum_up_to: Option<Integer<0, 100>>,
     vertical_m: Option<Number<LevelGap>>,
     /// File of types of airplanes: [types.NAME] with the keys of [airplane] for each.
     types_file: Option<Spanned<String>>,

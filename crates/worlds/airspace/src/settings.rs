@@ -135,6 +135,11 @@ impl Deployment {
         (!decides_at_once && sampled && !as_in_the_paper)
             .then_some("agents that sample update in parallel and learn from the joint cost")
     }
+
+    /// Returns whether somebody knows the costs of all pairs of a group, and not each airplane those of its own alone.
+    pub(crate) fn knows_all_costs(self) -> bool {
+        !matches!(self, Self::Team | Self::CompactTeam)
+    }
 }
 
 /// The tables that a run keeps.

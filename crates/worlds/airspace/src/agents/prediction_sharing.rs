@@ -251,7 +251,8 @@ impl PredictionSharingAgent {
         match self.own.settings().local_search {
             _ if !is_over => OptimizerStep::Done,
             LocalSearch::None => OptimizerStep::Conclude,
-            LocalSearch::Pairs => self.start_search(),
+            // No scenario asks agents for branch and bound, because none knows all costs.
+            LocalSearch::Pairs | LocalSearch::BranchAndBound => self.start_search(),
         }
     }
 

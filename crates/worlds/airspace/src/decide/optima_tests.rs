@@ -67,3 +67,30 @@ fn the_true_minimum_is_told_of_groups_of_every_deployment_and_of_no_larger_ones(
     let of_two = told("direct", "default", 2);
     assert!(of_two.known_minima < direct.known_minima, "{of_two:?}");
 }
+
+#[test]
+fn branch_and_bound_flies_the_minimum_of_every_group_alike_in_all_deployments_that_know_all_costs()
+{
+    let flown = |deployment: &str| {
+        let airspace = format!(
+            "deployment = \"{deployment}\"\nlocal_search = \"branch-and-bound\"\nrandom_starts = 0\nminimum_up_to = 20"
+        );
+        let run = run_in_a_small_disc(5, 3, &airspace);
+        (run.digest(), run.metrics())
+    };
+    let (digest, direct) = flown("direct");
+    assert!(direct.known_minima > 20, "{direct:?}");
+    assert_eq!(direct.reached_minima, direct.known_minima);
+    assert_eq!(direct.proved_minima, direct.optimizations);
+    for deployment in ["replica-team", "pim", "hierarchical-pim"] {
+        assert_eq!(flown(deployment).0, digest, "{deployment}");
+    }
+}
+
+#[test]
+fn a_team_whose_airplanes_know_their_own_pairs_alone_refuses_branch_and_bound() {
+    let text = "format = 1\nworld = \"airspace\"\n[airspace]\ndeployment = \"team\"\n\
+                local_search = \"branch-and-bound\"\n[airspace.generator]\nkind = \"random\"\nn = 3\n";
+    let error = airspace_run(&Source::new("s", text, ""), 1).expect_err("no team does").to_string();
+    assert!(error.contains("own pairs alone") && error.contains("replica-team"), "{error}");
+}

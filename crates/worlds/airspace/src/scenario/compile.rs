@@ -12,6 +12,7 @@ use crate::settings::{BuiltInMethod, Deployment, Disturbance, Grouping, Reactive
 use crate::shield::{ErrorBounds, ExemptIds, Fallback, ShieldedAircraft, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
+use sidestep_collectives::LocalSearch;
 use sidestep_import::geojson::GeoAreas;
 use sidestep_kernel::stream::Streams;
 use sidestep_kernel::{InputError, Seed};
@@ -324,6 +325,17 @@ impl<'a> Compiler<'a> {
             let remedy = "set order = \"parallel\" and utility = \"joint\", or \
                           estimator = { kind = \"exact\" }";
             return Err(self.source.error(None, cause, remedy));
+        }
+        if world.settings.local_search == LocalSearch::BranchAndBound
+            && !world.deployment.knows_all_costs()
+        {
+            let cause = format!(
+                "branch and bound in a {}, in which each airplane knows the costs of its own pairs alone",
+                world.deployment.name()
+            );
+            let remedy = "set local_search = \"pairs\", or deployment = \"replica-team\"";
+            let given = self.file.airspace.local_search.as_ref();
+            return Err(self.source.error(given.map(|given| given.span()), cause, remedy));
         }
         // A stream has that many blocks of four words.
         if world.max_samples().is_none_or(|samples| samples > u64::from(u16::MAX) * 4) {
