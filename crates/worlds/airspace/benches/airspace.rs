@@ -6,8 +6,9 @@
 use cpu_time::ProcessTime;
 use sidestep_airspace::airspace_run;
 use sidestep_airspace::flight::{
-    Action, AfterLastWaypoint, AircraftModel, Autopilot, DetourAlternatives, FlightLevelRange,
-    Frame, PairPlane, Point, Pose2, TimeDiscretization, WaypointRule, actions,
+    Action, AfterLastWaypoint, AircraftModel, Autopilot, ChangeAlternatives, DetourAlternatives,
+    FlightLevelRange, Frame, PairPlane, Point, Pose2, TimeDiscretization, TurnAction, WaypointRule,
+    actions,
 };
 use sidestep_airspace::objective::{ActionPredictions, Objective, build_group_game};
 use sidestep_collectives::{
@@ -49,7 +50,7 @@ impl Conflict {
         Self {
             poses: (0..n).map(pose).collect(),
             goals: (0..n).map(|k| [on(6500.0, angle(k) + turn)]).collect(),
-            actions: actions(&model, TIMING.dt_s, &[], legs),
+            actions: actions(&model, TIMING.dt_s, &[], legs, &ChangeAlternatives::default()),
             timing: TimeDiscretization { horizon, ..TIMING },
             model,
             objective,
@@ -68,7 +69,8 @@ impl Conflict {
 
     fn action_predictions(&self) -> Vec<ActionPredictions> {
         let of = |i: usize| {
-            let predict = |a: &Action| self.pilot(i).predict(*a, self.poses[i], 0, &self.timing);
+            let predict =
+                |a: &Action| self.pilot(i).predict(a.turn, self.poses[i], 0, &self.timing);
             let predictions = self.actions.iter().map(predict).collect();
             ActionPredictions::new(
                 predictions,
@@ -97,12 +99,12 @@ impl Game for UncachedGame<'_> {
         let predictions: Vec<_> = joint
             .iter()
             .enumerate()
-            .map(|(i, &x)| self.conflict.pilot(i).predict(actions[x], poses[i], 0, timing))
+            .map(|(i, &x)| self.conflict.pilot(i).predict(actions[x].turn, poses[i], 0, timing))
             .collect();
         let r = [model.separation_m; 2];
         let mut sum = 0.0;
         for (i, a) in predictions.iter().enumerate() {
-            let best = self.conflict.pilot(i).predict(Action::Proceed, poses[i], 0, timing);
+            let best = self.conflict.pilot(i).predict(TurnAction::Proceed, poses[i], 0, timing);
             sum += objective.alpha * objective.deviation_cost(a, &best);
             for b in &predictions[i + 1..] {
                 sum +=
@@ -150,6 +152,8 @@ fn exact() {
         inflation,
         mask: true,
         vertical_m: 300.0,
+        level_weight: 1.0,
+        speed_weight: 0.0,
     };
     for (name, horizon, legs, inflation, cooling) in [
         ("the paper's actions", 125, DetourAlternatives::default(), 1.05, 0.8),
@@ -175,8 +179,15 @@ fn exact() {
 }
 
 fn sampled() {
-    let objective =
-        Objective { alpha: 1.0, beta: 0.995, inflation: 1.0, mask: true, vertical_m: 300.0 };
+    let objective = Objective {
+        alpha: 1.0,
+        beta: 0.995,
+        inflation: 1.0,
+        mask: true,
+        vertical_m: 300.0,
+        level_weight: 1.0,
+        speed_weight: 0.0,
+    };
     let conflict = Conflict::new(10, 125, &DetourAlternatives::default(), objective);
     let settings = settings(Estimator::Sampled { block: 20, ageing: 0.7 }, 0.8, 50);
     let shared_s = best_s(5, || {

@@ -6,8 +6,8 @@
 
 use cpu_time::ProcessTime;
 use sidestep_airspace::flight::{
-    AfterLastWaypoint, AircraftModel, Autopilot, DetourAlternatives, FlightLevelRange, Frame,
-    Pose2, TimeDiscretization, WaypointRule, actions,
+    AfterLastWaypoint, AircraftModel, Autopilot, ChangeAlternatives, DetourAlternatives,
+    FlightLevelRange, Frame, Pose2, TimeDiscretization, WaypointRule, actions,
 };
 use sidestep_airspace::objective::{ActionPredictions, Objective, build_group_game};
 use sidestep_collectives::{
@@ -42,9 +42,22 @@ fn random_game(n: u32, number: u32) -> PairwiseGame {
         separation_m: 500.0,
         turns: 5,
     };
-    let objective =
-        Objective { alpha: 0.001, beta: 0.995, inflation: 1.12, mask: true, vertical_m: 300.0 };
-    let actions = actions(&model, TIMING.dt_s, &[], &DetourAlternatives::default_preset());
+    let objective = Objective {
+        alpha: 0.001,
+        beta: 0.995,
+        inflation: 1.12,
+        mask: true,
+        vertical_m: 300.0,
+        level_weight: 1.0,
+        speed_weight: 0.0,
+    };
+    let actions = actions(
+        &model,
+        TIMING.dt_s,
+        &[],
+        &DetourAlternatives::default_preset(),
+        &ChangeAlternatives::default(),
+    );
     let mut draws = draws(number, n, 1);
     let radius_m = 1500.0 * f64::from(n).sqrt();
     let options: Vec<ActionPredictions> = (0..n)
@@ -64,7 +77,7 @@ fn random_game(n: u32, number: u32) -> PairwiseGame {
             };
             let predictions = actions
                 .iter()
-                .map(|action| pilot.predict(*action, Pose2 { at, heading_rad }, 0, &TIMING))
+                .map(|action| pilot.predict(action.turn, Pose2 { at, heading_rad }, 0, &TIMING))
                 .collect();
             ActionPredictions::new(
                 predictions,

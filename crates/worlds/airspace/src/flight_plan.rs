@@ -10,8 +10,8 @@ use super::flight::{
     coordinates_from_degrees,
 };
 use super::settings::{
-    AbilityKeys, AltitudeLimit, Bank, PositiveRate, SeparationM, Speed, SpeedLimit, TurnCount,
-    TurnRate, ability_keys,
+    AbilityKeys, AltitudeLimit, Bank, ChangeList, PositiveRate, SeparationM, Speed, SpeedLimit,
+    TurnCount, TurnRate, ability_keys,
 };
 use limits::{LevelChange, Mistake, level_order_mistake, speed_order_mistake};
 use schemars::JsonSchema;
@@ -80,6 +80,10 @@ pub(super) struct AirplaneSection {
     pub(super) separation_m: Option<SeparationM>,
     /// Number of turn rates to choose from, if not that of all.
     pub(super) turns: Option<TurnCount>,
+    /// Changes of level among which method pc chooses, against the filed one.
+    pub(super) level_changes_m: Option<ChangeList>,
+    /// Changes of speed among which method pc chooses, against the filed one.
+    pub(super) speed_changes_m_s: Option<ChangeList>,
     /// Priority from 0 to 3: it has right of way over airplanes with a smaller one.
     pub(super) priority: Option<Integer<0, 3>>,
     non_cooperative: Option<bool>,

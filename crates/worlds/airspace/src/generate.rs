@@ -1,6 +1,8 @@
 //! Generated traffic: the super-conflict, random crossings, and converging streams.
 
-use super::flight::{AircraftModel, AirplaneStart, Performance, Point, Pose2, distance_m};
+use super::flight::{
+    AircraftModel, AirplaneStart, ChangeAlternatives, Performance, Point, Pose2, distance_m,
+};
 use super::purpose;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -33,6 +35,7 @@ pub(super) struct GeneratorParams<'a> {
     pub(super) jitter_m: f64,
     pub(super) model: &'a AircraftModel,
     pub(super) performance: &'a Performance,
+    pub(super) changes: &'a ChangeAlternatives,
     /// Further meters between the starts of random traffic, for errors that the shield allows for.
     pub(super) errors_m: f64,
 }
@@ -66,6 +69,7 @@ fn airplane(params: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airpla
         track: None,
         is_non_cooperative: false,
         priority: 0,
+        changes: params.changes.clone(),
     }
 }
 

@@ -8,7 +8,7 @@
 
 use super::areas::{AreaContext, LocalArea};
 use super::flight::{
-    FlightLevelRange, Frame, PairPlane, Point, Prediction, RigidMotion, distance_m,
+    FlightLevelRange, Frame, PairPlane, Point, Prediction, RigidMotion, SteadyChange, distance_m,
 };
 use super::non_cooperative::NonCooperativeAircraft;
 use serde::{Deserialize, Serialize};
@@ -16,6 +16,10 @@ use sidestep_collectives::PairwiseGame;
 use sidestep_kernel::{interrupt, math};
 
 /// The weights of separation and deviation.
+///
+/// Where actions change levels and speeds, a deviation is of all three:
+/// `|dx|^2 + level_weight dh^2 + speed_weight (dv T)^2`, with the difference `dx` of places at the horizon `T` as in the
+/// paper, `dh` of altitudes, and `dv` of speeds. Airplanes that are on levels apart at a step add no cost then.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Objective {
     /// Weight of deviations from the optimal path.
@@ -28,6 +32,10 @@ pub struct Objective {
     pub mask: bool,
     /// Airplanes at least this many meters above each other add no cost to each other.
     pub vertical_m: f64,
+    /// Weight of a square meter of altitude against one of place.
+    pub level_weight: f64,
+    /// Weight of the square of the way that a change of speed makes longer or shorter, beside that of the place.
+    pub speed_weight: f64,
 }
 
 impl Objective {
@@ -62,7 +70,7 @@ impl Objective {
         let mut weight = 1.0;
         let slices = a.points[..end].chunks(SLICE).zip(b.points[..end].chunks(SLICE));
         for (of_a, of_b) in slices {
-            let parts = self.slice_collision_costs(plane, [of_a, of_b], weight, r);
+            let parts = self.slice_collision_costs(plane, [of_a, of_b], weight, r, |_| true);
             sums[0] += parts[0];
             sums[1] += parts[1];
             weight = self.next_slice_weight(weight);
@@ -74,24 +82,28 @@ impl Objective {
         if self.mask { prediction.counted } else { prediction.points.len() }
     }
 
-    /// Returns the same over the points of one slice, of which the first has the weight `weight`.
+    /// Returns the same over the points of one slice, of which the first has the weight `weight`. `counts` tells whether
+    /// the two are on levels that meet at a point of the slice.
+    // Inlined, so that where all points count no call is left.
+    #[inline(always)]
     fn slice_collision_costs(
         &self,
         plane: &PairPlane,
         [a, b]: [&[Point]; 2],
         mut weight: f64,
         r: [f64; 2],
+        counts: impl Fn(usize) -> bool,
     ) -> [f64; 2] {
         let [ra, rb] = r.map(|r| r * self.inflation);
         let max_square_m2 = ra.max(rb) * ra.max(rb);
         let mut sums = [0.0; 2];
-        for (p, q) in a.iter().zip(b) {
+        for (k, (p, q)) in a.iter().zip(b).enumerate() {
             let [p, q] = plane.points(*p, *q);
             let dx = p[0] - q[0];
             let dy = p[1] - q[1];
             let square_m2 = dx * dx + dy * dy;
             // Nearly all points are farther apart than that, and need no root.
-            if square_m2 < max_square_m2 {
+            if square_m2 < max_square_m2 && counts(k) {
                 let distance_m = square_m2.sqrt();
                 let shortfall_a_m = (ra - distance_m).max(0.0);
                 let shortfall_b_m = (rb - distance_m).max(0.0);
@@ -144,6 +156,8 @@ pub struct ActionPredictions {
     pub levels: FlightLevelRange,
     /// Factor on the cost of deviations: more than 1 for an airplane that has right of way.
     deviation_weight: f64,
+    /// The altitudes and speeds that actions lead to; none where no action changes them.
+    changes: Option<ActionChanges>,
     /// Costs of the actions beside non-cooperative aircraft; empty where there are none.
     non_cooperative_costs: Vec<f64>,
     /// Costs of the actions in areas; empty where there are none.
@@ -162,8 +176,10 @@ impl ActionPredictions {
         levels: FlightLevelRange,
     ) -> Self {
         let max_points = predictions.iter().map(|p| p.points.len()).max().unwrap_or(0);
-        let slices: Vec<TimeSlice> =
-            (0..max_points).step_by(SLICE).map(|from| TimeSlice::new(&predictions, from)).collect();
+        let slices: Vec<TimeSlice> = (0..max_points)
+            .step_by(SLICE)
+            .map(|from| TimeSlice::new(&predictions, from, None))
+            .collect();
         let reach_m = slices.iter().map(|slice| slice.all.reach_m()).fold(0.0, f64::max);
         Self {
             predictions,
@@ -171,10 +187,45 @@ impl ActionPredictions {
             separation_m,
             levels,
             deviation_weight: 1.0,
+            changes: None,
             non_cooperative_costs: Vec::new(),
             area_costs: Vec::new(),
             slices,
             reach_m,
+        }
+    }
+
+    /// Returns the same options with the altitudes and speeds that the actions lead to.
+    #[must_use]
+    pub(crate) fn with_changes(mut self, changes: ActionChanges) -> Self {
+        let ranges = changes.altitudes.iter().map(|one| one.range(0.0, changes.horizon_s));
+        self.levels = ranges.fold(self.levels, |levels, range| {
+            levels.extended_by_level(range.low_m).extended_by_level(range.high_m)
+        });
+        let starts =
+            (0..self.predictions.first().map_or(0, |first| first.points.len())).step_by(SLICE);
+        let altitudes = Some(changes.altitudes.as_slice());
+        self.slices =
+            starts.map(|from| TimeSlice::new(&self.predictions, from, altitudes)).collect();
+        Self { changes: Some(changes), ..self }
+    }
+
+    /// Returns the levels that an action leads to within the horizon.
+    fn action_levels(&self, action: usize) -> FlightLevelRange {
+        match &self.changes {
+            None => self.levels,
+            Some(changes) => changes.altitudes[action].range(0.0, changes.horizon_s),
+        }
+    }
+
+    /// Returns the levels that an action leads to in one step.
+    fn step_levels(&self, action: usize, step: usize) -> FlightLevelRange {
+        match &self.changes {
+            None => self.levels,
+            Some(ActionChanges { altitudes, dtau_s, .. }) => {
+                let from_s = step as f64 * dtau_s;
+                altitudes[action].range(from_s, from_s + dtau_s)
+            }
         }
     }
 
@@ -203,11 +254,10 @@ impl ActionPredictions {
         else {
             return self;
         };
-        let on_levels: Vec<_> =
-            near.iter().filter(|area| area.is_on_levels(&self.levels)).collect();
-        let cost = |prediction: &Prediction| {
+        let cost = |(action, prediction): (usize, &Prediction)| {
+            let levels = self.action_levels(action);
             let points = &prediction.points[..objective.counted_points(prediction)];
-            let of_area = |area: &&LocalArea| {
+            let of_area = |area: &LocalArea| {
                 let mut weight = AREA_WEIGHT;
                 let mut sum = 0.0;
                 for shortfall_m in area.shortfalls_m(points, dtau_s, gap_m) {
@@ -216,9 +266,9 @@ impl ActionPredictions {
                 }
                 sum
             };
-            on_levels.iter().map(of_area).sum()
+            near.iter().filter(|area| area.is_on_levels(&levels)).map(of_area).sum()
         };
-        self.area_costs = self.predictions.iter().map(cost).collect();
+        self.area_costs = self.predictions.iter().enumerate().map(cost).collect();
         self
     }
 
@@ -241,9 +291,12 @@ impl ActionPredictions {
         self.non_cooperative_costs = self
             .predictions
             .iter()
-            .map(|prediction| {
+            .enumerate()
+            .map(|(action, prediction)| {
+                let levels = self.action_levels(action);
                 on_level
                     .iter()
+                    .filter(|one| one.levels.overlaps(&levels, objective.vertical_m))
                     .map(|one| {
                         objective.non_cooperative_cost(one, prediction, self.separation_m, dtau_s)
                     })
@@ -257,6 +310,31 @@ impl ActionPredictions {
         let points = &self.predictions[piece.actions[0]].points;
         let end = if mask { piece.counted } else { points.len().min(from + SLICE) };
         &points[from.min(end)..end]
+    }
+}
+
+/// The altitudes and speeds that the actions of an airplane lead to.
+#[derive(Debug, Clone)]
+pub(crate) struct ActionChanges {
+    /// The altitudes of each action, in meters.
+    pub(crate) altitudes: Vec<SteadyChange>,
+    /// The speeds of each action, in meters per second.
+    pub(crate) speeds: Vec<SteadyChange>,
+    /// Seconds of a step.
+    pub(crate) dtau_s: f64,
+    /// Seconds until the horizon.
+    pub(crate) horizon_s: f64,
+}
+
+impl ActionChanges {
+    /// Returns the squares of the deviations of altitude and speed of an action from the optimal one, by their weights.
+    fn deviation_cost(&self, objective: &Objective, action: usize) -> f64 {
+        let [of_level, of_speed] = [&self.altitudes, &self.speeds].map(|changes| {
+            let optimal = changes.last().expect("every airplane has an optimal action");
+            changes[action].after(self.horizon_s) - optimal.after(self.horizon_s)
+        });
+        let way_m = of_speed * self.horizon_s;
+        objective.level_weight * of_level * of_level + objective.speed_weight * way_m * way_m
     }
 }
 
@@ -279,7 +357,8 @@ struct DistinctSlicePath {
 }
 
 impl TimeSlice {
-    fn new(predictions: &[Prediction], from: usize) -> Self {
+    /// Returns a slice from point `from` on. `altitudes` are those of all actions, where some change them.
+    fn new(predictions: &[Prediction], from: usize, altitudes: Option<&[SteadyChange]>) -> Self {
         let mut pieces: Vec<DistinctSlicePath> = Vec::new();
         for (action, prediction) in predictions.iter().enumerate() {
             let points = slice_points(prediction, from);
@@ -287,8 +366,12 @@ impl TimeSlice {
             let counted = prediction.counted.clamp(from.min(end), end);
             // The last points are compared first, because most paths that differ do so there.
             let same = pieces.iter_mut().find(|piece| {
-                let other = slice_points(&predictions[piece.actions[0]], from);
-                piece.counted == counted && points.last() == other.last() && points == other
+                let first = piece.actions[0];
+                let other = slice_points(&predictions[first], from);
+                piece.counted == counted
+                    && points.last() == other.last()
+                    && points == other
+                    && altitudes.is_none_or(|all| all[first] == all[action])
             });
             match same {
                 Some(piece) => piece.actions.push(action),
@@ -372,6 +455,11 @@ pub(super) fn own_costs(objective: &Objective, options: &ActionPredictions) -> V
         .iter()
         .map(|prediction| alpha * objective.deviation_cost(prediction, optimal))
         .collect();
+    if let Some(changes) = &options.changes {
+        for (action, cost) in costs.iter_mut().enumerate() {
+            *cost += alpha * changes.deviation_cost(objective, action);
+        }
+    }
     for further in [&options.non_cooperative_costs, &options.area_costs] {
         costs.iter_mut().zip(further).for_each(|(cost, further)| *cost += further);
     }
@@ -412,6 +500,7 @@ fn pair_costs(
         Some([first, second]) => p.moved(first).is_within_gap(&q.moved(second), gap_m),
     };
     let columns = b.predictions.len();
+    let has_changes = a.changes.is_some() || b.changes.is_some();
     let mut costs = None;
     let mut weight = 1.0;
     for (k, (of_a, of_b)) in a.slices.iter().zip(&b.slices).enumerate() {
@@ -421,7 +510,16 @@ fn pair_costs(
             let of_p = a.piece_points(p, k * SLICE, objective.mask);
             for q in of_b.pieces.iter().filter(|q| is_near(&p.bounds, &q.bounds)) {
                 let of_q = b.piece_points(q, k * SLICE, objective.mask);
-                let parts = objective.slice_collision_costs(&plane, [of_p, of_q], weight, r);
+                let parts = if has_changes {
+                    let meets = |point: usize| {
+                        let step = k * SLICE + point;
+                        let levels = a.step_levels(p.actions[0], step);
+                        levels.overlaps(&b.step_levels(q.actions[0], step), objective.vertical_m)
+                    };
+                    objective.slice_collision_costs(&plane, [of_p, of_q], weight, r, meets)
+                } else {
+                    objective.slice_collision_costs(&plane, [of_p, of_q], weight, r, |_| true)
+                };
                 if parts != [0.0; 2] {
                     // Most pairs never need the table, which is large.
                     let costs =
@@ -454,8 +552,8 @@ fn add_action_pair_costs(
 #[cfg(test)]
 mod tests {
     use super::super::flight::{
-        Action, AfterLastWaypoint, AircraftModel, Autopilot, Pose2, TimeDiscretization,
-        WaypointRule,
+        Action, AfterLastWaypoint, AircraftModel, Autopilot, ChangeAlternatives, Pose2,
+        TimeDiscretization, TurnAction, WaypointRule,
     };
     use super::*;
     use serde_json::Value;
@@ -500,6 +598,8 @@ mod tests {
             inflation: 1.0,
             mask: params["mask"] == true,
             vertical_m: 1.0,
+            level_weight: 1.0,
+            speed_weight: 0.0,
         };
         let after = if params["after"] == "pursue" {
             AfterLastWaypoint::Pursue
@@ -531,11 +631,11 @@ mod tests {
             };
             let pose = Pose2 { at: [number("x"), number("y")], heading_rad: number("psi") };
             let chosen = match action["omega"].as_f64() {
-                None => Action::Proceed,
-                Some(omega_rad_s) if action["g"] == 0 => Action::Hold { omega_rad_s },
-                Some(omega_rad_s) => Action::Then { omega_rad_s, hold_s: timing.dt_s },
+                None => TurnAction::Proceed,
+                Some(omega_rad_s) if action["g"] == 0 => TurnAction::Hold { omega_rad_s },
+                Some(omega_rad_s) => TurnAction::Then { omega_rad_s, hold_s: timing.dt_s },
             };
-            let optimal = pilot.predict(Action::Proceed, pose, 0, &timing);
+            let optimal = pilot.predict(TurnAction::Proceed, pose, 0, &timing);
             let prediction = pilot.predict(chosen, pose, 0, &timing);
             for (key, k) in [("f_k1", 0), ("f_k10", 9), ("f_kmax", timing.horizon - 1)] {
                 (0..2).for_each(|c| near(prediction.points[k][c], &expected[key][i][c], name));
@@ -583,7 +683,7 @@ mod tests {
         let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
         let passing = WaypointRule { tolerance_m: 100.0, passes: true, passes_abeam: false };
         let all = [DetourAlternatives::default(), DetourAlternatives::default_preset()]
-            .map(|legs| actions(&model, 5.0, &[], &legs));
+            .map(|legs| actions(&model, 5.0, &[], &legs, &ChangeAlternatives::default()));
         let mut meetings = 0;
         for (k, mask) in (0..12).flat_map(|k| [(k, true), (k, false)]) {
             let options = [0.0, 1.0].map(|side| {
@@ -594,7 +694,7 @@ mod tests {
                 let after = AfterLastWaypoint::Straight;
                 let pilot =
                     Autopilot { model: &model, mission: &mission, passing, after, dtau_s: 1.0 };
-                let predict = |action: &Action| pilot.predict(*action, pose, 0, &timing);
+                let predict = |action: &Action| pilot.predict(action.turn, pose, 0, &timing);
                 let predictions = all[k as usize % 2].iter().map(predict).collect();
                 ActionPredictions::new(
                     predictions,
@@ -604,8 +704,15 @@ mod tests {
                 )
             });
             let [a, b] = &options;
-            let objective =
-                Objective { alpha: 1.0, beta: 0.995, inflation: 1.05, mask, vertical_m: 300.0 };
+            let objective = Objective {
+                alpha: 1.0,
+                beta: 0.995,
+                inflation: 1.05,
+                mask,
+                vertical_m: 300.0,
+                level_weight: 1.0,
+                speed_weight: 0.0,
+            };
             let free = vec![[0.0; 2]; a.predictions.len() * b.predictions.len()];
             let table = pair_costs(&objective, a, b).unwrap_or(free);
             let pairs =
@@ -617,5 +724,66 @@ mod tests {
             }
         }
         assert!(meetings > 500, "{meetings}");
+    }
+
+    /// Two fly toward each other, and one of them may climb.
+    #[test]
+    fn airplanes_cost_each_other_at_the_steps_at_which_their_levels_meet_alone() {
+        let straight = |from_m: f64, v_m_s: f64| {
+            let points: Vec<Point> =
+                (1..=60).map(|k| [from_m + v_m_s * f64::from(k), 0.0]).collect();
+            Prediction { counted: points.len(), points }
+        };
+        let options = |from_m: f64, v_m_s: f64, altitudes: Option<Vec<SteadyChange>>| {
+            let count = altitudes.as_ref().map_or(1, Vec::len);
+            let predictions = vec![straight(from_m, v_m_s); count];
+            let levels = FlightLevelRange::from_level(0.0);
+            let options = ActionPredictions::new(predictions, Frame::PLANE, 500.0, levels);
+            match altitudes {
+                None => options,
+                Some(altitudes) => options.with_changes(ActionChanges {
+                    speeds: vec![SteadyChange::constant(35.0); count],
+                    altitudes,
+                    dtau_s: 1.0,
+                    horizon_s: 60.0,
+                }),
+            }
+        };
+        let objective = Objective {
+            alpha: 0.001,
+            beta: 0.995,
+            inflation: 1.0,
+            mask: true,
+            vertical_m: 300.0,
+            level_weight: 2.0,
+            speed_weight: 0.0,
+        };
+        let climb = SteadyChange { from: 0.0, to: 400.0, rate_s: 10.0 };
+        let level = SteadyChange::constant(0.0);
+        let a = options(-1400.0, 35.0, Some(vec![climb, level]));
+        let b = options(1400.0, -35.0, None);
+        let table = pair_costs(&objective, &a, &b).expect("they meet");
+        // Above 300 m, from 30 s on, they are 700 m and less apart.
+        let each = objective.collision_costs(
+            &PairPlane::ONE_FRAME,
+            &a.predictions[1],
+            &b.predictions[0],
+            [500.0; 2],
+        );
+        assert_eq!(table[1], each);
+        assert!(each[0] > 1e5, "{each:?}");
+        assert_eq!(table[0], [0.0; 2]);
+        // From a slower climb there is a part left: that before it is 300 m above the other one.
+        let slow = SteadyChange { rate_s: 8.0, ..climb };
+        let a = options(-1400.0, 35.0, Some(vec![slow, level]));
+        let table = pair_costs(&objective, &a, &b).expect("they meet");
+        assert!(table[0][0] > 0.0 && table[0][0] < 0.3 * each[0], "{table:?}");
+        let costs = own_costs(&objective, &a);
+        assert_eq!(costs, [0.001 * 2.0 * 400.0 * 400.0, 0.0]);
+        // On levels far apart nothing costs anything.
+        let far = options(1400.0, -35.0, Some(vec![SteadyChange::constant(900.0)]));
+        let mut game = PairwiseGame::new(vec![vec![0.0; 2], vec![0.0]]);
+        add_pair_costs(&mut game, &objective, [0, 1], [&a, &far]);
+        assert_eq!(game.pair_costs().count(), 0);
     }
 }

@@ -20,9 +20,9 @@ use super::flight::AirplaneStart;
 use super::flight_plan::AirplaneSection;
 use super::method::Methods;
 use super::settings::{
-    BuiltInMethod, Cooling, Decision, Deployment, Fading, Gibibytes, Grouping, HeadingNoise,
-    Inflation, LevelGap, LookAhead, RecordSection, RightOfWayRule, RoundCount, Step, Tolerance,
-    Weight,
+    BuiltInMethod, ChangeWeight, Combinations, Cooling, Decision, Deployment, Fading, Gibibytes,
+    Grouping, HeadingNoise, Inflation, LevelGap, LookAhead, RecordSection, RightOfWayRule,
+    RoundCount, Step, Tolerance, Weight,
 };
 use super::shield::Fallback;
 use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
@@ -105,6 +105,12 @@ struct AirspaceSection {
     beta: Option<Number<Fading>>,
     inflation: Option<Number<Inflation>>,
     holds_s: TimeList,
+    /// Which changes of heading, level and speed an action of method pc may have together.
+    combinations: Combinations,
+    /// Weight of a square meter of altitude against one of place, in the deviation of method pc.
+    level_weight: Option<Number<ChangeWeight>>,
+    /// Weight of the square of the way that a change of speed makes longer or shorter, beside that of the place.
+    speed_weight: Option<Number<ChangeWeight>>,
     legs: Option<Spanned<LegsSection>>,
     /// File of areas in GeoJSON, beside those that are given here.
     areas_file: Option<Spanned<String>>,

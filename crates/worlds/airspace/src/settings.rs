@@ -1,17 +1,21 @@
 //! Choices and numbers that a scenario makes and that lower layers depend on.
 
 mod abilities;
+mod changes;
 mod values;
 
 pub(crate) use abilities::{
     AbilityKeys, AltitudeLimit, PositiveRate, SpeedLimit, TypeSection, ability_keys,
 };
+pub(crate) use changes::ChangeList;
+pub use changes::Combinations;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder, Utility};
 pub(crate) use values::{
-    Bank, Cooling, Decision, Fading, Gibibytes, HeadingNoise, Held, Inflation, LevelGap, LookAhead,
-    RoundCount, SeparationM, Speed, Step, Tolerance, TurnCount, TurnRate, Weight,
+    Bank, ChangeWeight, Cooling, Decision, Fading, Gibibytes, HeadingNoise, Held, Inflation,
+    LevelGap, LookAhead, RoundCount, SeparationM, Speed, Step, Tolerance, TurnCount, TurnRate,
+    Weight,
 };
 
 /// The methods by which airplanes choose their actions.

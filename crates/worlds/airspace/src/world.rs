@@ -174,7 +174,9 @@ impl AirspaceWorld {
             self.actions = Arc::new(
                 self.airplanes
                     .iter()
-                    .map(|a| actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs))
+                    .map(|a| {
+                        actions(&a.model, self.timing.dt_s, &self.holds_s, &self.legs, &a.changes)
+                    })
                     .collect(),
             );
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
@@ -527,7 +529,7 @@ impl AirspaceWorld {
         let InterOrderSegment { model, mission, .. } = self.segment(known.slot, known.orders);
         let actions = self.present_actions(known);
         let route = RoutePosition { mission, next: known.next, pose: known.pose };
-        let predictions = self.flight_environment().predictions(model, &actions, route);
+        let predictions = self.flight_environment().predictions(model, &actions, route, None);
         let frame = self.surface.frame_at(known.pose.at);
         ActionPredictions::new(predictions, frame, model.separation_m, self.levels(known))
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)

@@ -34,6 +34,9 @@ pub(super) fn apply_controls(
         // Plans that are sure are safe only if all fly them, and orbits always are.
         for control in controls.iter_mut().flatten() {
             control.maneuver = Maneuver::Orbit;
+            if world.has_resolution_memory() {
+                control.memory.record_maneuver(&control.maneuver);
+            }
         }
     }
     state.drop_external_actions(&own.iter().map(|own| own.id).collect::<Vec<_>>());

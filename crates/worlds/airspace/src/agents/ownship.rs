@@ -82,7 +82,7 @@ impl CommonKnowledge {
         };
         let route = RoutePosition { mission, next, pose: beacon.pose };
         let actions = actions_at_turn_rate(actions, filed, beacon.omega_max_rad_s);
-        let predictions = self.air.predictions(&model, &actions, route);
+        let predictions = self.air.predictions(&model, &actions, route, None);
         let frame = self.air.surface.frame_at(beacon.pose.at);
         ActionPredictions::new(predictions, frame, beacon.separation_m, beacon.levels)
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)

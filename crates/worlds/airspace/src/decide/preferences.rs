@@ -2,7 +2,7 @@
 
 use super::local_flight::LocalFlight;
 use crate::agents::ActionChoice;
-use crate::flight::{Action, KnownAircraft};
+use crate::flight::{Action, KnownAircraft, TurnAction};
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 
@@ -32,11 +32,11 @@ pub(super) fn rank_by_turn_difference(
 /// Returns how much the turn rate of an action differs from the desired one; less than any other for proceeding,
 /// which comes first.
 fn rate_difference_rad_s(action: Action, desired_rad_s: f64) -> f64 {
-    match action {
-        Action::Hold { omega_rad_s }
-        | Action::Then { omega_rad_s, .. }
-        | Action::Leg { omega_rad_s, .. } => (omega_rad_s - desired_rad_s).abs(),
-        Action::Proceed => -1.0,
+    match action.turn {
+        TurnAction::Hold { omega_rad_s }
+        | TurnAction::Then { omega_rad_s, .. }
+        | TurnAction::Leg { omega_rad_s, .. } => (omega_rad_s - desired_rad_s).abs(),
+        TurnAction::Proceed => -1.0,
     }
 }
 
@@ -75,7 +75,7 @@ pub(super) fn turn_profiles_from_actions(
     let flight = LocalFlight::new(world, known, world.timing.dt_s);
     let mut profiles: Vec<TurnProfile> = Vec::new();
     for &action in actions {
-        let profile = turn_profile(world, &flight, action);
+        let profile = turn_profile(world, &flight, action.turn);
         if !profiles.contains(&profile) {
             profiles.push(profile);
         }
@@ -83,7 +83,7 @@ pub(super) fn turn_profiles_from_actions(
     profiles
 }
 
-fn turn_profile(world: &AirspaceWorld, flight: &LocalFlight<'_>, action: Action) -> TurnProfile {
+fn turn_profile(world: &AirspaceWorld, flight: &LocalFlight<'_>, turn: TurnAction) -> TurnProfile {
     let air = world.flight_environment();
     let dtau_s = world.timing.dtau_s;
     let autopilot = flight.autopilot(world);
@@ -91,7 +91,7 @@ fn turn_profile(world: &AirspaceWorld, flight: &LocalFlight<'_>, action: Action)
     let mut next = flight.next;
     let mut omegas_rad_s = Vec::new();
     for k in 0..world.timing.points_per_dt() {
-        let fixed_rad_s = action.turn_rate_rad_s(k as f64 * dtau_s);
+        let fixed_rad_s = turn.turn_rate_rad_s(k as f64 * dtau_s);
         let omega = fixed_rad_s.unwrap_or_else(|| air.steer(&autopilot, pose, next));
         omegas_rad_s.push(omega);
         let before = pose;

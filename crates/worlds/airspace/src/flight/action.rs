@@ -1,13 +1,23 @@
 //! Actions: the possible motions of an airplane in the near future, as the optimizer knows them.
 
+use super::change::{ChangeAlternatives, FlightChange};
 use super::motion::AircraftModel;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::fmt;
 
-/// An action: a turn rate, held for some time, and then proceeding to the way-point.
+/// An action: a turn, and changes of level and speed beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Action {
+pub struct Action {
+    /// The turn.
+    pub turn: TurnAction,
+    /// The changes of level and speed.
+    pub change: FlightChange,
+}
+
+/// A turn rate, held for some time, and then proceeding to the way-point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum TurnAction {
     /// The turn rate, held for the whole horizon (the paper's g = 0).
     Hold {
         /// Turn rate in radians per second, positive to the left.
@@ -34,6 +44,16 @@ pub enum Action {
 }
 
 impl Action {
+    /// Proceeding at the level and the speed of the filed flight: the optimal action.
+    pub const OPTIMAL: Self = Self::from_turn(TurnAction::Proceed);
+
+    /// Returns a turn at the level and the speed of the filed flight.
+    pub const fn from_turn(turn: TurnAction) -> Self {
+        Self { turn, change: FlightChange::NONE }
+    }
+}
+
+impl TurnAction {
     /// Returns the turn rate of the action after `flown_s` seconds of it, unless it proceeds to the
     /// way-point by then.
     #[inline]
@@ -70,7 +90,7 @@ fn is_before(time_s: f64, end_s: f64) -> bool {
     time_s < end_s - 1e-9
 }
 
-impl fmt::Display for Action {
+impl fmt::Display for TurnAction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Hold { omega_rad_s } => f.write_str(&turn_text(omega_rad_s)),
@@ -83,6 +103,20 @@ impl fmt::Display for Action {
             }
             Self::Proceed => f.write_str("to the way-point"),
         }
+    }
+}
+
+impl fmt::Display for Action {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let FlightChange { level_m, speed_m_s } = self.change;
+        write!(f, "{}", self.turn)?;
+        if level_m != 0.0 {
+            write!(f, ", {level_m:+} m")?;
+        }
+        if speed_m_s != 0.0 {
+            write!(f, ", {speed_m_s:+} m/s")?;
+        }
+        Ok(())
     }
 }
 
@@ -118,15 +152,17 @@ impl DetourAlternatives {
 
     /// Returns the legs that start with a turn rate. For straight on there is one turning time
     /// only, because all of them are the same path.
-    fn actions_with_turn_rate(&self, omega_rad_s: f64) -> Vec<Action> {
+    fn turns_with_rate(&self, omega_rad_s: f64) -> Vec<TurnAction> {
         let mut actions = Vec::new();
         if omega_rad_s == 0.0 {
-            actions.extend(self.until_s.iter().map(|&hold_s| Action::Then { omega_rad_s, hold_s }));
+            actions.extend(
+                self.until_s.iter().map(|&hold_s| TurnAction::Then { omega_rad_s, hold_s }),
+            );
             return actions;
         }
         for &turn_s in &self.turns_s {
             for &until_s in &self.until_s {
-                actions.push(Action::Leg { omega_rad_s, turn_s, until_s });
+                actions.push(TurnAction::Leg { omega_rad_s, turn_s, until_s });
             }
         }
         actions
@@ -136,26 +172,46 @@ impl DetourAlternatives {
 /// Returns the action set of a model, ordered by turn rate, the optimal action last. Without legs
 /// it is the paper's: `2 m + 1` actions, every rate held forever and for `dt_s`. With legs, which
 /// never start a turn only to undo it, these take the place of the held turns; straight on forever
-/// remains. `holds_s` are further times in seconds for which turns are held.
+/// remains. `holds_s` are further times in seconds for which turns are held. `changes` of level and speed follow the turns:
+/// each beside the way to the way-point alone, or beside every turn.
 pub fn actions(
     model: &AircraftModel,
     dt_s: f64,
     holds_s: &[f64],
     legs: &DetourAlternatives,
+    changes: &ChangeAlternatives,
 ) -> Vec<Action> {
+    let turns = turns(model, dt_s, holds_s, legs);
+    let mut all: Vec<Action> = turns.iter().copied().map(Action::from_turn).collect();
+    for change in changes.all() {
+        if changes.is_product {
+            all.extend(turns.iter().map(|&turn| Action { turn, change }));
+        }
+        all.push(Action { turn: TurnAction::Proceed, change });
+    }
+    all.push(Action::OPTIMAL);
+    all
+}
+
+/// Returns the turns of a model, ordered by turn rate, without the way to the way-point.
+fn turns(
+    model: &AircraftModel,
+    dt_s: f64,
+    holds_s: &[f64],
+    legs: &DetourAlternatives,
+) -> Vec<TurnAction> {
     let mut all = Vec::new();
     for k in 0..model.turns {
         let omega_rad_s = turn_rate_rad_s(model, k);
         if legs.is_empty() || omega_rad_s == 0.0 {
-            all.push(Action::Hold { omega_rad_s });
+            all.push(TurnAction::Hold { omega_rad_s });
         }
         if legs.is_empty() {
-            all.push(Action::Then { omega_rad_s, hold_s: dt_s });
+            all.push(TurnAction::Then { omega_rad_s, hold_s: dt_s });
         }
-        all.extend(holds_s.iter().map(|&hold_s| Action::Then { omega_rad_s, hold_s }));
-        all.extend(legs.actions_with_turn_rate(omega_rad_s));
+        all.extend(holds_s.iter().map(|&hold_s| TurnAction::Then { omega_rad_s, hold_s }));
+        all.extend(legs.turns_with_rate(omega_rad_s));
     }
-    all.push(Action::Proceed);
     all
 }
 
@@ -171,7 +227,10 @@ pub(crate) fn actions_at_turn_rate<'a>(
     let factor = omega_max_rad_s / model.omega_max_rad_s;
     // Rounding must not lead beyond the limit, which all check.
     let scaled = |omega_rad_s: f64| (factor * omega_rad_s).clamp(-omega_max_rad_s, omega_max_rad_s);
-    actions.iter().map(|action| action.map_turn_rate(scaled)).collect()
+    actions
+        .iter()
+        .map(|action| Action { turn: action.turn.map_turn_rate(scaled), ..*action })
+        .collect()
 }
 
 /// Returns the `k`-th of a model's turn rates, from the fastest right turn to the fastest left turn.
@@ -189,6 +248,9 @@ fn turn_rate_rad_s(model: &AircraftModel, k: usize) -> f64 {
 mod tests {
     use super::*;
 
+    const NONE: ChangeAlternatives =
+        ChangeAlternatives { levels_m: Vec::new(), speeds_m_s: Vec::new(), is_product: false };
+
     fn model() -> AircraftModel {
         AircraftModel {
             v_m_s: 35.0,
@@ -200,24 +262,47 @@ mod tests {
 
     #[test]
     fn the_action_set_is_ordered_and_contains_straight_flight() {
-        let all = actions(&model(), 5.0, &[30.0], &DetourAlternatives::default());
+        let all = actions(&model(), 5.0, &[30.0], &DetourAlternatives::default(), &NONE);
         assert_eq!(all.len(), 5 * 3 + 1);
-        assert_eq!(all[6], Action::Hold { omega_rad_s: 0.0 });
-        assert_eq!(all[8], Action::Then { omega_rad_s: 0.0, hold_s: 30.0 });
-        assert_eq!(all[15], Action::Proceed);
+        assert_eq!(all[6], Action::from_turn(TurnAction::Hold { omega_rad_s: 0.0 }));
+        assert_eq!(all[8], Action::from_turn(TurnAction::Then { omega_rad_s: 0.0, hold_s: 30.0 }));
+        assert_eq!(all[15], Action::OPTIMAL);
     }
 
     #[test]
     fn legs_take_the_place_of_turns_that_are_undone() {
         let legs = DetourAlternatives { turns_s: vec![5.0, 15.0], until_s: vec![60.0] };
-        let all = actions(&model(), 5.0, &[], &legs);
+        let all = actions(&model(), 5.0, &[], &legs, &NONE);
         let omega_rad_s = -4f64.to_radians();
         assert_eq!(all.len(), 4 * 2 + 2 + 1);
-        assert_eq!(all[1], Action::Leg { omega_rad_s, turn_s: 15.0, until_s: 60.0 });
-        assert_eq!(all[4], Action::Hold { omega_rad_s: 0.0 });
-        assert_eq!(all[5], Action::Then { omega_rad_s: 0.0, hold_s: 60.0 });
-        assert_eq!(all[10], Action::Proceed);
-        let rates: Vec<_> = [0.0, 14.0, 15.0, 59.0, 60.0].map(|t| all[1].turn_rate_rad_s(t)).into();
+        assert_eq!(
+            all[1],
+            Action::from_turn(TurnAction::Leg { omega_rad_s, turn_s: 15.0, until_s: 60.0 })
+        );
+        assert_eq!(all[4], Action::from_turn(TurnAction::Hold { omega_rad_s: 0.0 }));
+        assert_eq!(all[5], Action::from_turn(TurnAction::Then { omega_rad_s: 0.0, hold_s: 60.0 }));
+        assert_eq!(all[10], Action::OPTIMAL);
+        let rates: Vec<_> =
+            [0.0, 14.0, 15.0, 59.0, 60.0].map(|t| all[1].turn.turn_rate_rad_s(t)).into();
         assert_eq!(rates, [Some(omega_rad_s), Some(omega_rad_s), Some(0.0), Some(0.0), None]);
+    }
+
+    #[test]
+    fn changes_of_level_and_speed_stand_beside_the_way_to_the_way_point_or_beside_every_turn() {
+        let legs = DetourAlternatives::default();
+        let mut changes = ChangeAlternatives {
+            levels_m: vec![-300.0, 300.0],
+            speeds_m_s: vec![-5.0],
+            is_product: false,
+        };
+        let alone = actions(&model(), 5.0, &[], &legs, &changes);
+        assert_eq!(alone.len(), 5 * 2 + 3 + 1);
+        assert_eq!(alone[10].to_string(), "to the way-point, -300 m");
+        assert_eq!(alone[13], Action::OPTIMAL);
+        changes.is_product = true;
+        let all = actions(&model(), 5.0, &[], &legs, &changes);
+        assert_eq!(all.len(), 11 * 6);
+        assert_eq!(all[0].to_string(), "-4.0 °/s");
+        assert_eq!(all[64].to_string(), "to the way-point, +300 m, -5 m/s");
     }
 }

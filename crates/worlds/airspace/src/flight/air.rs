@@ -5,6 +5,7 @@
 
 use super::action::Action;
 use super::autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
+use super::change::{ChangeableFlight, SteadyChange};
 use super::motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
 use super::surface::{Frame, Surface, way_point_reach_m};
 use sidestep_kernel::{interrupt, math};
@@ -149,12 +150,13 @@ impl FlightConditions {
     /// Returns where each action leads an airplane that is at a point of its route, in the frame of that point.
     ///
     /// Predictions are made in the moving air, where way-points drift. Over one horizon, each is taken where it will
-    /// be when the airplane, flying straight, reaches it.
-    pub fn predictions(
+    /// be when the airplane, flying straight, reaches it. `flight` is given where actions change level or speed.
+    pub(crate) fn predictions(
         &self,
         model: &AircraftModel,
         actions: &[Action],
         route: RoutePosition<'_>,
+        flight: Option<&ChangeableFlight<'_>>,
     ) -> Vec<Prediction> {
         let RoutePosition { mission, next, pose } = route;
         interrupt::check();
@@ -166,7 +168,16 @@ impl FlightConditions {
         let mission = self.local_mission(frame, model, local, seconds);
         let mission = self.wind_corrected_mission(&mission, pose.at, next, model.v_m_s);
         let autopilot = self.autopilot(model, &mission);
-        actions.iter().map(|action| autopilot.predict(*action, pose, next, &self.timing)).collect()
+        let speeds = |action: &Action| match flight {
+            Some(flight) => flight.speeds(action.change),
+            None => SteadyChange::constant(model.v_m_s),
+        };
+        actions
+            .iter()
+            .map(|action| {
+                autopilot.predict_at_speeds(action.turn, speeds(action), (pose, next), &self.timing)
+            })
+            .collect()
     }
 
     /// Returns the seconds of a straight flight over the ground to `goal`.

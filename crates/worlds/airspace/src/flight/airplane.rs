@@ -1,5 +1,6 @@
 //! Airplanes as a scenario gives them, and as their group knows them.
 
+use super::change::ChangeAlternatives;
 use super::motion::{AircraftModel, Point, Pose2};
 use super::order::{FlightOrder, FlightTask};
 use super::performance::Performance;
@@ -35,6 +36,8 @@ pub struct AirplaneStart {
     pub is_non_cooperative: bool,
     /// Its priority: it has right of way over airplanes with a smaller one.
     pub priority: u8,
+    /// The changes of level and speed among which method `pc` chooses for it.
+    pub changes: ChangeAlternatives,
 }
 
 impl AirplaneStart {

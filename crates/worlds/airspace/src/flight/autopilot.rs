@@ -1,6 +1,7 @@
 //! Predictions: an autopilot flies actions and missions step by step, and returns the path.
 
-use super::action::Action;
+use super::action::TurnAction;
+use super::change::SteadyChange;
 use super::motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m, sinc};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::geometry::{dot, normalized, sub};
@@ -217,8 +218,8 @@ pub struct Autopilot<'a> {
 impl Autopilot<'_> {
     /// Returns the turn rate of an action in the step that starts after `flown_s` seconds of it.
     #[inline]
-    pub fn omega_rad_s(&self, action: Action, pose: Pose2, next: usize, flown_s: f64) -> f64 {
-        match action.turn_rate_rad_s(flown_s) {
+    pub fn omega_rad_s(&self, turn: TurnAction, pose: Pose2, next: usize, flown_s: f64) -> f64 {
+        match turn.turn_rate_rad_s(flown_s) {
             Some(omega_rad_s) => omega_rad_s,
             None => match (self.mission.get(next), self.after) {
                 (Some(&goal), _) => pose.steer(goal, self.model.omega_max_rad_s, self.dtau_s),
@@ -248,34 +249,49 @@ impl Autopilot<'_> {
         next
     }
 
-    /// Predicts `timing.horizon` points of an action from `pose` toward way-point `next`.
+    /// Predicts `timing.horizon` points of a turn from `pose` toward way-point `next`.
     pub fn predict(
         &self,
-        action: Action,
+        turn: TurnAction,
         pose: Pose2,
         next: usize,
         timing: &TimeDiscretization,
     ) -> Prediction {
+        self.predict_at_speeds(turn, SteadyChange::constant(self.model.v_m_s), (pose, next), timing)
+    }
+
+    /// Predicts the same at airspeeds that change, from a pose toward a way-point by its number.
+    pub(super) fn predict_at_speeds(
+        &self,
+        turn: TurnAction,
+        speeds: SteadyChange,
+        (pose, mut next): (Pose2, usize),
+        timing: &TimeDiscretization,
+    ) -> Prediction {
         let mut points = Vec::with_capacity(timing.horizon);
         let mut flight = PredictionState::new(pose);
-        let mut next = next;
         // If it does not arrive within the horizon, all points count.
         let mut counted = timing.horizon;
         for k in 0..timing.horizon {
             let flown_s = k as f64 * self.dtau_s;
+            let v_m_s = if speeds.from == speeds.to {
+                speeds.to
+            } else {
+                0.5 * (speeds.after(flown_s) + speeds.after(flown_s + self.dtau_s))
+            };
             let before = flight.pose;
-            let goal = self.mission.get(next).filter(|_| action.turn_rate_rad_s(flown_s).is_none());
+            let goal = self.mission.get(next).filter(|_| turn.turn_rate_rad_s(flown_s).is_none());
             if self.after == AfterLastWaypoint::Pursue {
                 // An airplane that returns to its last way-point turns to the side that rounding
                 // decides, so the rounding must be that of the motion itself.
-                let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
-                flight.pose = flight.pose.step(self.model.v_m_s, omega, self.dtau_s);
+                let omega = self.omega_rad_s(turn, flight.pose, next, flown_s);
+                flight.pose = flight.pose.step(v_m_s, omega, self.dtau_s);
             } else if goal.is_some_and(|&g| flight.is_heading_for(g)) {
                 // Most steps are such, and straight on needs no arctangent.
-                flight.step(self.model.v_m_s, 0.0, self.dtau_s);
+                flight.step(v_m_s, 0.0, self.dtau_s);
             } else {
-                let omega = self.omega_rad_s(action, flight.pose, next, flown_s);
-                flight.step(self.model.v_m_s, omega, self.dtau_s);
+                let omega = self.omega_rad_s(turn, flight.pose, next, flown_s);
+                flight.step(v_m_s, omega, self.dtau_s);
             }
             points.push(flight.pose.at);
             if next < self.mission.len() {
@@ -292,6 +308,7 @@ impl Autopilot<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::action::{DetourAlternatives, actions};
+    use super::super::change::ChangeAlternatives;
     use super::*;
     use proptest::prelude::*;
 
@@ -373,13 +390,14 @@ mod tests {
             };
             let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 200 };
             let some = DetourAlternatives { turns_s: vec![5.0, 15.0], until_s: vec![20.0, 60.0] };
-            let held = actions(&model, 5.0, &[30.0], &DetourAlternatives::default());
-            let all = [held, actions(&model, 5.0, &[], &some)].concat();
-            let action = all[which % all.len()];
+            let none = ChangeAlternatives::default();
+            let held = actions(&model, 5.0, &[30.0], &DetourAlternatives::default(), &none);
+            let all = [held, actions(&model, 5.0, &[], &some, &none)].concat();
+            let turn = all[which % all.len()].turn;
             let (mut pose, mut next) = (Pose2 { at: [0.0, 0.0], heading_rad }, 0);
-            let predicted = pilot.predict(action, pose, next, &timing);
+            let predicted = pilot.predict(turn, pose, next, &timing);
             for (k, point) in predicted.points.iter().enumerate() {
-                let omega = pilot.omega_rad_s(action, pose, next, k as f64);
+                let omega = pilot.omega_rad_s(turn, pose, next, k as f64);
                 let before = pose;
                 pose = before.step(model.v_m_s, omega, 1.0);
                 next = pilot.next_way_point((before, pose), next);
@@ -404,7 +422,7 @@ mod tests {
             };
             let pose = Pose2 { at: [0.0, 0.0], heading_rad };
             let timing = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 400 };
-            let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
+            let flown = pilot.predict(TurnAction::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < 400, "still flying to {mission:?}");
             // It ends within the tolerance, or where it was about as near as it ever was.
             let apart_m = |k: usize| distance_m(flown.points[k], mission[0]);
@@ -427,7 +445,7 @@ mod tests {
             let pilot = Autopilot { model: &model, mission: &mission, passing, after: AfterLastWaypoint::Straight, dtau_s };
             let pose = Pose2 { at: [0.0, 0.0], heading_rad };
             let timing = TimeDiscretization { dt_s: 5.0, dtau_s, horizon: (200.0 / dtau_s) as usize };
-            let flown = pilot.predict(Action::Proceed, pose, 0, &timing);
+            let flown = pilot.predict(TurnAction::Proceed, pose, 0, &timing);
             prop_assert!(flown.counted < timing.horizon, "still flying to {mission:?}");
             let end = flown.points[flown.counted - 1];
             let near_m = tolerance_m.max(2.0 * model.turn_radius_m()).max(2.0 * v_m_s * dtau_s);

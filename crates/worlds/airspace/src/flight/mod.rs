@@ -3,7 +3,8 @@
 //! ```text
 //! motion.rs                          a pose, and one step of it
 //! performance.rs  acceleration.rs    what an airplane can fly, and changes of speed that take time
-//! action.rs  autopilot.rs  air.rs    possible actions, where they lead, in which wind
+//! action.rs  change.rs               possible actions: turns, and changes of level and speed
+//! autopilot.rs  air.rs               where they lead, in which wind
 //! airplane.rs  order.rs  segment.rs  one airplane, its orders, and the flight between them
 //! track.rs  levels.rs                recorded tracks, and ranges of altitude
 //! leg.rs  proximity.rs               stretches of flight, how near two of them come, and how deep into each other's zone
@@ -17,6 +18,7 @@ mod action;
 mod air;
 mod airplane;
 mod autopilot;
+mod change;
 mod chart;
 mod gusts;
 mod leg;
@@ -33,11 +35,13 @@ mod track;
 
 pub(crate) use acceleration::SpeedChanges;
 pub(crate) use action::actions_at_turn_rate;
-pub use action::{Action, DetourAlternatives, actions};
+pub use action::{Action, DetourAlternatives, TurnAction, actions};
 pub use air::{FlightConditions, RoutePosition};
 pub(crate) use airplane::DoneOrders;
 pub use airplane::{AirplaneStart, KnownAircraft};
 pub use autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
+pub(crate) use change::ChangeableFlight;
+pub use change::{ChangeAlternatives, FlightChange, SteadyChange};
 pub use chart::Chart;
 pub use gusts::Gusts;
 pub(crate) use gusts::MAX_CORRELATION_CYCLES;

@@ -3,14 +3,14 @@
 use super::compile::Compiler;
 use super::performance::performance_from_keys;
 use crate::flight::{
-    AircraftModel, AirplaneStart, Performance, Pose2, SpeedChanges, Surface, TimeDiscretization,
-    Track,
+    AircraftModel, AirplaneStart, ChangeAlternatives, Performance, Pose2, SpeedChanges, Surface,
+    TimeDiscretization, Track,
 };
 use crate::flight_plan::{AirplaneSection, mixed_positions};
 use crate::generate::{GeneratorKind, GeneratorParams, generate};
 use crate::settings::{
-    AbilityKeys, AltitudeLimit, Bank, PositiveRate, SeparationM, Speed, SpeedLimit, TurnCount,
-    TurnRate, ability_keys,
+    AbilityKeys, AltitudeLimit, Bank, ChangeList, Combinations, PositiveRate, SeparationM, Speed,
+    SpeedLimit, TurnCount, TurnRate, ability_keys,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -72,6 +72,10 @@ pub(super) struct ModelSection {
     /// Distance that all keep from each other.
     separation_m: Option<SeparationM>,
     turns: Option<TurnCount>,
+    /// Changes of level among which method pc chooses, against the filed one.
+    pub(super) level_changes_m: Option<ChangeList>,
+    /// Changes of speed among which method pc chooses, against the filed one.
+    pub(super) speed_changes_m_s: Option<ChangeList>,
 }
 
 impl ModelSection {
@@ -88,6 +92,7 @@ struct Abilities {
     type_name: Option<String>,
     separation_m: f64,
     turns: usize,
+    changes: ChangeAlternatives,
 }
 
 impl Abilities {
@@ -139,11 +144,22 @@ impl Compiler<'_> {
         }
         let separation_m = own.and_then(|own| own.separation_m).or(common.separation_m);
         let turns = own.and_then(|own| own.turns).or(common.turns);
+        let levels = own.and_then(|own| own.level_changes_m.as_ref());
+        let speeds = own.and_then(|own| own.speed_changes_m_s.as_ref());
+        let list = |own: Option<&ChangeList>, common: Option<&ChangeList>| {
+            own.or(common).map(|list| list.0.clone()).unwrap_or_default()
+        };
+        let changes = ChangeAlternatives {
+            levels_m: list(levels, common.level_changes_m.as_ref()),
+            speeds_m_s: list(speeds, common.speed_changes_m_s.as_ref()),
+            is_product: self.file.airspace.combinations == Combinations::All,
+        };
         Abilities {
             keys,
             type_name: own_type.or(common_type).map(|name| name.get_ref().clone()),
             separation_m: separation_m.map_or(PAPER_MODEL.separation_m, f64::from),
             turns: turns.map_or(PAPER_MODEL.turns, |turns| turns.0),
+            changes,
         }
     }
 
@@ -239,8 +255,16 @@ impl Compiler<'_> {
         let jitter_m = s.jitter_m.map_or(DEFAULT_JITTER_M, f64::from);
         let errors_m = self.error_margin_m(model);
         let performance = &performance;
-        let params =
-            GeneratorParams { kind: s.kind, n, radius_m, jitter_m, model, performance, errors_m };
+        let params = GeneratorParams {
+            kind: s.kind,
+            n,
+            radius_m,
+            jitter_m,
+            model,
+            performance,
+            changes: &abilities.changes,
+            errors_m,
+        };
         let generated = generate(&params, streams).map_err(|placed| {
             let cause = format!("no place is left after {placed} of {n} airplanes");
             self.source.error(section.span(), cause, "give a larger radius_m or a smaller n")
@@ -318,6 +342,7 @@ impl Compiler<'_> {
             track: None,
             is_non_cooperative: s.is_non_cooperative(self.source)?,
             priority: s.priority.map_or(0, |priority| priority.get() as u8),
+            changes: abilities.changes.clone(),
         })
     }
 
@@ -349,7 +374,8 @@ impl Compiler<'_> {
         let is_non_cooperative = section.get_ref().is_non_cooperative(self.source)?;
         let airplane = replayed_airplane(track, (model, performance), replay, is_non_cooperative);
         let priority = section.get_ref().priority.map_or(0, |priority| priority.get() as u8);
-        Ok(AirplaneStart { callsign, priority, ..airplane })
+        let changes = abilities.changes.clone();
+        Ok(AirplaneStart { callsign, priority, changes, ..airplane })
     }
 
     /// Returns the time for which recorded airplanes follow their tracks.
@@ -398,5 +424,6 @@ fn replayed_airplane(
         track: Some(track),
         is_non_cooperative,
         priority: 0,
+        changes: ChangeAlternatives::default(),
     }
 }

@@ -22,6 +22,10 @@ const RANDOM_STARTS: u32 = 8;
 /// with the square of the number of actions.
 const MAX_TIMES: usize = 20;
 
+/// Weight of a square meter of altitude against one of place: a change of level by 300 m costs as much as a detour of
+/// 300 m.
+const LEVEL_WEIGHT: f64 = 1.0;
+
 /// A list of times.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TimeList(pub(super) Vec<f64>);
@@ -153,6 +157,8 @@ impl Compiler<'_> {
             inflation: section.inflation.map_or(if is_paper { 1.0 } else { 1.12 }, f64::from),
             mask: true,
             vertical_m,
+            level_weight: section.level_weight.map_or(LEVEL_WEIGHT, f64::from),
+            speed_weight: section.speed_weight.map_or(0.0, f64::from),
         }
     }
 

@@ -41,6 +41,7 @@ bounds! {
     Held, 0.001, 86_400.0, "0.001 to 86400 s", "no turn or leg takes more than a day";
     Tolerance, 0.001, 1e6, "0.001 to 1e6 m", "way-points are reached to the millimeter at best";
     Weight, 1e-12, 1e6, "1e-12 to 1e6", "beyond that rounding hides one part of the objective";
+    ChangeWeight, 0.0, 1e6, "0 to 1e6", "beyond that nothing else counts";
     Fading, 1e-3, 1.0, "0.001 to 1", "the future counts less than the present, but it counts";
     Inflation, 0.1, 10.0, "0.1 to 10", "it is a margin on the separation";
     Cooling, 0.01, 1.0, "0.01 to 1", "faster than a hundredth a round leaves nothing to learn from";
