@@ -100,6 +100,7 @@ pub(super) fn prepare_decisions(
     if context.world.shield {
         entry::release_exempt(context, &flown.ids);
         entry::assign_fallbacks(context, &flown.ids);
+        entry::renew_fallbacks(context, &flown.ids);
         areas::report_exempt_areas(context, &flown.ids);
         errors::report_beyond_bound(context, &flown.ids);
     }

@@ -14,6 +14,7 @@
 use crate::flight::{Point, Pose2, distance_m};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{ShieldedAircraft, TurnProfile, stays_apart_for};
+use sidestep_kernel::geometry::{add_scaled, norm};
 use std::f64::consts::PI;
 
 /// The clearance of a path from all others. The derived order prefers clear paths, and then wide margins.
@@ -88,11 +89,13 @@ impl<'a> NonCooperativeAvoidance<'a> {
         }
     }
 
-    /// Returns its poses at the start of each step of a profile, and at the end.
+    /// Returns its poses at the start of each step of a profile, and at the end, in the common air.
     fn poses_along(&self, profile: &TurnProfile) -> Vec<Pose2> {
         let mut poses = vec![self.aircraft.local_pose()];
+        let drift_m_s = self.aircraft.drift.now_m_s;
         for &omega in &profile.omegas_rad_s {
-            poses.push(poses[poses.len() - 1].step(self.aircraft.v_m_s, omega, self.dtau_s));
+            let pose = poses[poses.len() - 1].step(self.aircraft.v_m_s, omega, self.dtau_s);
+            poses.push(Pose2 { at: add_scaled(pose.at, drift_m_s, self.dtau_s), ..pose });
         }
         poses
     }
@@ -109,16 +112,18 @@ impl<'a> NonCooperativeAvoidance<'a> {
         one: &NonCooperativeAircraft,
     ) -> bool {
         let v_m_s = self.aircraft.v_m_s;
+        let drift_m_s = self.aircraft.drift.now_m_s;
         profile.omegas_rad_s.iter().zip(poses).enumerate().all(|(k, (&omega, pose))| {
             let step_s = k as f64 * self.dtau_s;
             // The distance from the circle in which the other may be at that time.
             let distance_left_m = |t_s: f64| {
-                distance_m(pose.step(v_m_s, omega, t_s).at, one.at) - one.top_m_s * (step_s + t_s)
+                let at = add_scaled(pose.step(v_m_s, omega, t_s).at, drift_m_s, t_s);
+                distance_m(at, one.at) - one.top_m_s * (step_s + t_s)
             };
             stays_apart_for(
                 &distance_left_m,
                 self.dtau_s,
-                v_m_s + one.top_m_s,
+                v_m_s + norm(drift_m_s) + one.top_m_s,
                 self.required_gap_m(one),
             )
         })
@@ -133,7 +138,8 @@ impl<'a> NonCooperativeAvoidance<'a> {
             .map(|k| distance_m(poses[k].at, one.position_after(k as f64 * self.dtau_s)))
             .fold(f64::INFINITY, f64::min);
         let end = poses[steps];
-        let after_a_second = end.step(self.aircraft.v_m_s, 0.0, 1.0).at;
+        let straight = end.step(self.aircraft.v_m_s, 0.0, 1.0).at;
+        let after_a_second = add_scaled(straight, self.aircraft.drift.now_m_s, 1.0);
         let [vx, vy] = one.velocity_m_s;
         let relative_velocity =
             [vx - (after_a_second[0] - end.at[0]), vy - (after_a_second[1] - end.at[1])];

@@ -5,7 +5,7 @@ use sidestep_kernel::InputError;
 use sidestep_scenario::{Bundle, ResolvedScenario, Source};
 use std::path::Path;
 
-/// Returns the scenario as it ran, with the file of its areas. Its number of cycles may follow from the flights, and types of
+/// Returns the scenario as it ran, with the files of its areas and winds. Its number of cycles may follow from the flights, and types of
 /// airplanes are stored as they were read: a later version may have other built-in ones.
 ///
 /// # Errors
@@ -23,6 +23,11 @@ pub(crate) fn resolve_scenario(
         let file = Path::new(path).file_name().unwrap_or_default().display();
         let path = bundle.copy(&format!("areas-{file}"), path)?;
         bundle.set("airspace.areas_file", format_args!("{path:?}"));
+    }
+    if let Some(path) = compiled.wind_file() {
+        let file = Path::new(path).file_name().unwrap_or_default().display();
+        let path = bundle.copy(&format!("wind-{file}"), path)?;
+        bundle.set("airspace.wind_file", format_args!("{path:?}"));
     }
     bundle.finish()
 }

@@ -23,7 +23,7 @@ use std::ops::Range;
 /// Rate at which levels are changed when an order does not give one: 1500 ft/min.
 pub(super) const CLIMB_M_S: f64 = 7.62;
 /// A position, height or angle within reasonable bounds.
-type BoundedNumber = Number<Closed<-1_000_000_000, 1_000_000_000>>;
+pub(super) type BoundedNumber = Number<Closed<-1_000_000_000, 1_000_000_000>>;
 /// A time within reasonable bounds, not before the start.
 pub(super) type BoundedTime = Number<Closed<0, 1_000_000_000>>;
 pub(super) type BoundedPoint = Point<2, Closed<-1_000_000_000, 1_000_000_000>>;

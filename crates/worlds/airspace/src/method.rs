@@ -40,7 +40,7 @@ pub struct MethodPercept<'a> {
     pub way_point_m: Point,
     /// Its greatest turn rate, in radians per second.
     pub omega_max_rad_s: f64,
-    /// The wind, in meters per second; velocities of airplanes are through the air.
+    /// The wind around the airplane, in meters per second; velocities of airplanes are relative to that air.
     pub wind_m_s: Point,
     /// The others of its group on its levels, by rising id, and then those that avoid nobody. All that it could come
     /// too near to within `airspace.horizon_s` are among them.

@@ -23,9 +23,10 @@ pub struct NonCooperativeAircraft {
     /// Its position as all see it, with the error of the cycle: coordinates of the scenario, or a place in a frame, see
     /// [`Self::in_frame`].
     pub(crate) at: Point,
-    /// Its velocity through the air, in meters per second east and north.
+    /// Its velocity through the common air, see [`FlightConditions`](crate::flight::FlightConditions), in meters per second
+    /// east and north.
     pub(crate) velocity_m_s: Point,
-    /// Its greatest speed through the air, in meters per second.
+    /// Its greatest speed through that air, in meters per second.
     pub(crate) top_m_s: f64,
     pub(crate) separation_m: f64,
     /// Bound in meters on how far it may be from where it is seen.

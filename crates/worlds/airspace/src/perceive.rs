@@ -8,6 +8,7 @@ use super::scratch::PhaseContext;
 use super::state::AirspaceState;
 use super::world::AirspaceWorld;
 use sidestep_kernel::distr::normal;
+use sidestep_kernel::geometry::{add, norm};
 use sidestep_kernel::{Cycle, EntitySlot, math};
 use std::ops::Range;
 
@@ -131,11 +132,19 @@ fn non_cooperative_at(context: &PhaseContext<'_>, slot: EntitySlot) -> NonCooper
             let levels = FlightLevelRange::between(altitude_m - climb_m, altitude_m + climb_m);
             ([vx - wx, vy - wy], top_m_s, levels)
         }
+        // Its motion is that in the common air, which its own air may drift through.
         _ => {
             // Farther than within `dt`, because methods consider it as far as they look ahead.
             let look_ahead_s = world.reactive_settings().look_ahead_s.max(dt_s);
             let levels = segment.levels_within(altitude_m, look_ahead_s);
-            (along(segment.model.v_m_s), world.top_m_s[slot as usize], levels)
+            let air_m_s = along(segment.model.v_m_s);
+            let top_m_s = world.top_m_s[slot as usize];
+            let drift_m_s = world.air_at(current.pose().at, altitude_m).drift_m_s();
+            if drift_m_s == [0.0; 2] {
+                (air_m_s, top_m_s, levels)
+            } else {
+                (add(air_m_s, drift_m_s), top_m_s + norm(drift_m_s), levels)
+            }
         }
     };
     NonCooperativeAircraft {

@@ -15,6 +15,7 @@ mod remarks;
 mod rule_changes;
 mod start_groups;
 mod types;
+mod winds;
 
 use super::flight::AirplaneStart;
 use super::flight_plan::AirplaneSection;
@@ -50,6 +51,7 @@ use sidestep_scenario::{
 };
 use std::sync::Arc;
 use types::TypeTable;
+use winds::{WindLayerSection, WindTable, load_wind_file};
 
 /// Sets of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
@@ -141,6 +143,10 @@ struct AirspaceSection {
     replay_until_s: Option<Number<ReplayUntilRange>>,
     group_memory_gib: Option<Number<Gibibytes>>,
     wind_m_s: Option<Spanned<Point<2>>>,
+    /// Winds by altitude, in place of wind_m_s: between two altitudes the wind changes steadily.
+    winds: Vec<Spanned<WindLayerSection>>,
+    /// File of winds by altitude and place in CSV, in place of wind_m_s.
+    wind_file: Option<Spanned<String>>,
     gusts: Option<Spanned<GustsSection>>,
     /// Latitude and longitude of the origin.
     origin_deg: Option<Spanned<Point<2, Closed<-360, 360>>>>,
@@ -213,13 +219,15 @@ struct ParsedScenario {
     types: TypeTable,
     /// The content of its file of areas.
     areas_file: Option<GeoAreas>,
+    /// The content of its file of winds.
+    wind_file: Option<WindTable>,
     /// Methods beside the built-in ones.
     own: Methods,
 }
 
 impl ParsedScenario {
     /// Returns the digest by which agents recognize those of the same scenario: of all that decides how airplanes fly, the
-    /// text, the seed, and what other files say of types and areas.
+    /// text, the seed, and what other files say of types, areas and winds.
     fn fingerprint(&self, seed: u64) -> u64 {
         let mut text = self.source.text.clone();
         if !self.types.is_empty() {
@@ -227,6 +235,9 @@ impl ParsedScenario {
         }
         if let Some(found) = &self.areas_file {
             text += &format!("{:?}", found.areas);
+        }
+        if let Some(found) = &self.wind_file {
+            text += &format!("{:?}", found.rows);
         }
         fingerprint(&text, seed)
     }
@@ -249,8 +260,10 @@ impl CompiledAirspace {
         let (head, file) = source.parse_world::<AirspaceFile>()?;
         let types = TypeTable::load(source, &file)?;
         let areas_file = load_areas_file(source, file.airspace.areas_file.as_ref())?;
+        let wind_file = load_wind_file(source, file.airspace.wind_file.as_ref())?;
         let own = own.clone();
-        let recipe = ParsedScenario { source: source.clone(), head, file, types, areas_file, own };
+        let source = source.clone();
+        let recipe = ParsedScenario { source, head, file, types, areas_file, wind_file, own };
         Compiler::new(&Arc::new(recipe)).compile()
     }
 
@@ -283,6 +296,11 @@ impl CompiledAirspace {
     /// Returns the path of the file of its areas, if it names one.
     pub(crate) fn areas_file(&self) -> Option<&str> {
         self.recipe.file.airspace.areas_file.as_ref().map(|file| &file.get_ref()[..])
+    }
+
+    /// Returns the path of the file of its winds, if it names one.
+    pub(crate) fn wind_file(&self) -> Option<&str> {
+        self.recipe.file.airspace.wind_file.as_ref().map(|file| &file.get_ref()[..])
     }
 
     /// Returns the state at the start.

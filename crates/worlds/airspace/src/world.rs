@@ -8,20 +8,23 @@ use super::areas::{AreaContext, Areas, LocalAreas};
 use super::flight::{
     Action, AirplaneStart, Chart, DetourAlternatives, DoneOrders, FlightConditions,
     FlightLevelRange, FlightPhase, Gusts, InterOrderSegment, KnownAircraft, Point, Pose2,
-    RoutePosition, SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, actions,
-    actions_at_turn_rate, segments_after_orders,
+    RoutePosition, SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, WindField,
+    actions, actions_at_turn_rate, segments_after_orders,
 };
 use super::measures::{FlightEffort, MeasureSettings};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, Objective};
 use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings, RightOfWayRule};
-use super::shield::{ErrorBounds, Fallback, OrbitSide, common_orbit_rates, curvature_error_m};
+use super::shield::{
+    AirDrift, ErrorBounds, Fallback, OrbitSide, common_orbit_rates, curvature_error_m,
+};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder};
 use sidestep_kernel::control::AgentTeams;
+use sidestep_kernel::geometry::sub;
 use sidestep_kernel::network::Network;
 use sidestep_kernel::stream::Streams;
-use sidestep_kernel::{Cycle, EntityId, EntitySlot};
+use sidestep_kernel::{Cycle, EntityId, EntitySlot, math};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -86,8 +89,11 @@ pub struct AirspaceWorld {
     pub origin_deg: Option<Point>,
     /// Time of the start, in seconds since 1970, UTC, where traffic has a date.
     pub start_utc_s: Option<f64>,
-    /// The wind, which all know, in meters per second.
+    /// The wind, which all know, in meters per second. Where it differs from level to level or from place to place, the
+    /// velocity of the air in which motions of different airplanes are compared.
     pub wind_m_s: Point,
+    /// The wind on each level and in each place, where it differs.
+    pub wind_field: Option<Arc<WindField>>,
     /// Gusts beside it, which nobody knows.
     pub gusts: Option<Gusts>,
     /// The areas to stay out of, or inside of.
@@ -303,20 +309,71 @@ impl AirspaceWorld {
         self.chart().pose(pose)
     }
 
-    /// Returns the properties of the air, which are the same for all airplanes.
+    /// Returns the properties of the air in which motions of different airplanes are compared: the air that all fly
+    /// through, unless the wind differs from level to level or from place to place.
     pub fn flight_environment(&self) -> FlightConditions {
         FlightConditions {
             timing: self.timing,
             passing: self.passing,
             wind_m_s: self.wind_m_s,
+            common_wind_m_s: self.wind_m_s,
             surface: self.surface,
         }
     }
 
-    /// Returns the properties of the air through which an airplane flies in a cycle, gusts included. What is planned
-    /// knows nothing of these.
-    pub(crate) fn flown_air(&self, slot: EntitySlot, now: Cycle) -> FlightConditions {
-        let mut air = self.flight_environment();
+    /// Returns the properties of the air in a place, in coordinates of the scenario, and on a level.
+    pub fn air_at(&self, at: Point, altitude_m: f64) -> FlightConditions {
+        FlightConditions { wind_m_s: self.wind_at(at, altitude_m), ..self.flight_environment() }
+    }
+
+    /// Returns the properties of the air around an airplane, as those know it that see it there.
+    pub(crate) fn air_around(&self, known: KnownAircraft) -> FlightConditions {
+        self.air_at(known.pose.at, known.altitude_m)
+    }
+
+    /// Returns the wind in a place and on a level, in meters per second.
+    fn wind_at(&self, at: Point, altitude_m: f64) -> Point {
+        match &self.wind_field {
+            Some(field) => field.velocity_m_s(at, altitude_m),
+            None => self.wind_m_s,
+        }
+    }
+
+    /// Returns the greatest speed of the wind, in meters per second.
+    pub(crate) fn max_wind_m_s(&self) -> f64 {
+        match &self.wind_field {
+            Some(field) => field.max_speed_m_s,
+            None => math::hypot(self.wind_m_s[0], self.wind_m_s[1]),
+        }
+    }
+
+    /// Returns the greatest speed of the air anywhere relative to the air in which motions are compared, in meters per
+    /// second: 0 where all are in one wind.
+    pub(crate) fn max_drift_m_s(&self) -> f64 {
+        self.wind_field.as_ref().map_or(0.0, |field| field.max_drift_m_s)
+    }
+
+    /// Returns how the air moves that an airplane flies through which is in a place and on a level now, and will be on
+    /// another one at the end of the cycle.
+    pub(crate) fn air_drift(&self, at: Point, altitude_m: f64, next_altitude_m: f64) -> AirDrift {
+        let Some(field) = &self.wind_field else { return AirDrift::default() };
+        let drift_m_s = |altitude_m: f64| sub(field.velocity_m_s(at, altitude_m), self.wind_m_s);
+        AirDrift {
+            now_m_s: drift_m_s(altitude_m),
+            next_m_s: drift_m_s(next_altitude_m),
+            varies_by_place: field.varies_by_place(),
+        }
+    }
+
+    /// Returns the properties of the air through which an airplane flies in a cycle at whose start it is somewhere, gusts
+    /// included. What is planned knows nothing of these.
+    pub(crate) fn flown_air(
+        &self,
+        slot: EntitySlot,
+        now: Cycle,
+        (at, altitude_m): (Point, f64),
+    ) -> FlightConditions {
+        let mut air = self.air_at(at, altitude_m);
         if let Some(gusts) = &self.gusts {
             let [east_m_s, north_m_s] = gusts.velocity_m_s(&self.streams, slot, now);
             air.wind_m_s = [air.wind_m_s[0] + east_m_s, air.wind_m_s[1] + north_m_s];
@@ -417,6 +474,22 @@ impl AirspaceWorld {
         (v_m_s * look_ahead_s).max(self.fallback_reach_m(i))
             + self.error_m(i)
             + self.bounds.position_m
+            + self.drift_reach_m(i, look_ahead_s)
+    }
+
+    /// Returns how far the air may carry an airplane relative to others, in meters, while its method and its shield look
+    /// ahead.
+    fn drift_reach_m(&self, i: usize, look_ahead_s: f64) -> f64 {
+        // Where it carries all alike, none.
+        let Some(field) = &self.wind_field else { return 0.0 };
+        field.max_drift_m_s * look_ahead_s.max(self.shield_look_ahead_s(i))
+    }
+
+    /// Returns for how long the shield looks ahead at what moves relative to the air of an airplane: a `dt`, its longest way
+    /// to an orbit, and one turn.
+    fn shield_look_ahead_s(&self, i: usize) -> f64 {
+        let turn_s = std::f64::consts::TAU / self.orbit_rad_s[i];
+        self.fallback_lead_s(i) + self.timing.dt_s + turn_s
     }
 
     /// Returns how far the method looks ahead, and how much separation it asks for.
@@ -489,7 +562,8 @@ impl AirspaceWorld {
         self.segment(known.slot, known.orders).levels_within(known.altitude_m, look_ahead_s)
     }
 
-    /// Returns what is the same for all areas around airplanes in a cycle, for methods that look so far ahead.
+    /// Returns what is the same for all areas around airplanes in a cycle, for methods that look so far ahead: in the air
+    /// in which motions of different airplanes are compared.
     pub(crate) fn area_context(&self, now: Cycle, look_ahead_s: f64) -> AreaContext<'_> {
         AreaContext {
             areas: &self.areas,
@@ -506,16 +580,24 @@ impl AirspaceWorld {
     }
 
     /// Returns the areas that the plans of an airplane may come to, or its fallback, if all see it in some place.
-    pub(crate) fn areas_around(&self, slot: EntitySlot, at: Point, now: Cycle) -> LocalAreas {
+    pub(crate) fn areas_around(
+        &self,
+        slot: EntitySlot,
+        (at, altitude_m): (Point, f64),
+        now: Cycle,
+    ) -> LocalAreas {
         // Most scenarios have none.
         if self.areas.is_empty() || !self.shield {
             return None;
         }
         let i = slot as usize;
-        let turn_s = std::f64::consts::TAU / self.orbit_rad_s[i];
-        let look_ahead_s = self.fallback_lead_s(i) + self.timing.dt_s + turn_s;
+        let look_ahead_s = self.shield_look_ahead_s(i);
         let reach_m = self.fallback_reach_m(i) + 2.0 * self.error_m(i) + AREA_GAP_M;
-        self.area_context(now, look_ahead_s).near(self.surface.frame_at(at), at, reach_m)
+        let context = AreaContext {
+            wind_m_s: self.wind_at(at, altitude_m),
+            ..self.area_context(now, look_ahead_s)
+        };
+        context.near(self.surface.frame_at(at), at, reach_m)
     }
 
     /// Returns where each action would lead an airplane, and the cost of that beside non-cooperative aircraft and among
@@ -529,7 +611,7 @@ impl AirspaceWorld {
         let InterOrderSegment { model, mission, .. } = self.segment(known.slot, known.orders);
         let actions = self.present_actions(known);
         let route = RoutePosition { mission, next: known.next, pose: known.pose };
-        let predictions = self.flight_environment().predictions(model, &actions, route, None);
+        let predictions = self.air_around(known).predictions(model, &actions, route, None);
         let frame = self.surface.frame_at(known.pose.at);
         ActionPredictions::new(predictions, frame, model.separation_m, self.levels(known))
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)

@@ -73,7 +73,7 @@ fn max_recorded_m(world: &AirspaceWorld, flights: &[AircraftCycleMotion<'_>]) ->
     for flight in flights {
         let slot = flight.slot as usize;
         max_gap_m = max_gap_m.max(world.airplanes[slot].model.separation_m);
-        max_speed_m_s = max_speed_m_s.max(world.top_m_s[slot]);
+        max_speed_m_s = max_speed_m_s.max(world.top_m_s[slot] + world.max_drift_m_s());
     }
     let seconds = world.timing.dtau_s + seconds_since_sweep(world);
     MAX_RECORDED_SEPARATIONS * max_gap_m + 2.0 * max_speed_m_s * seconds
@@ -103,7 +103,9 @@ fn plane_of_near_pair(
     b: &AircraftCycleMotion<'_>,
 ) -> Option<PairPlane> {
     let dtau_s = world.timing.dtau_s;
-    let speeds_m_s = world.top_m_s[a.slot as usize] + world.top_m_s[b.slot as usize];
+    let speeds_m_s = world.top_m_s[a.slot as usize]
+        + world.top_m_s[b.slot as usize]
+        + 2.0 * world.max_drift_m_s();
     let limit_m = MAX_RECORDED_SEPARATIONS * pair_separation_m(world, a, b) + speeds_m_s * dtau_s;
     let from_origins_m = [a, b].map(|one| math::hypot(one.pose.at[0], one.pose.at[1]));
     if a.frame.is_surely_beyond(&b.frame, limit_m + from_origins_m[0] + from_origins_m[1]) {

@@ -111,8 +111,7 @@ pub(super) fn record_area_times(
         }
         let is_near = |flight: &&AircraftCycleMotion<'_>| {
             let flown_m = 1.01 * world.top_m_s[flight.slot as usize] * world.timing.dt_s;
-            let [wx, wy] = world.wind_m_s;
-            let range_m = flown_m + math::hypot(wx, wy) * world.timing.dt_s;
+            let range_m = flown_m + world.max_wind_m_s() * world.timing.dt_s;
             flight.end.is_none() && !area.is_surely_far(world.surface, flight.from, ends_s, range_m)
         };
         for flight in flights.iter().filter(is_near) {

@@ -8,7 +8,7 @@
 
 use super::protect::shielded_aircraft;
 use crate::scratch::PhaseContext;
-use crate::shield::{Fallback, OrbitSide, ShieldedAircraft, entry_fallbacks};
+use crate::shield::{Fallback, OrbitSide, ShieldedAircraft, entry_fallbacks, renewed_fallbacks};
 use sidestep_kernel::EntitySlot;
 
 /// Ends the exemption of pairs that are safe by now. `flown` are the group's airplanes that the method
@@ -31,6 +31,26 @@ pub(super) fn release_exempt(context: &PhaseContext<'_>, flown: &[EntitySlot]) {
                     && state.exempt_ids(other).contains(&slot)
                     && !own.is_safe_with(&shielded_aircraft(context, other))
         });
+    }
+}
+
+/// Replaces stored fallbacks that a wind which differs from level to level or from place to place drives together, and
+/// exempts the pairs for which there are none that are apart. `flown` are the group's airplanes that the method flies, by
+/// id.
+pub(super) fn renew_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySlot]) {
+    let PhaseContext { world, state, now, .. } = *context;
+    if world.wind_field.is_none() {
+        return;
+    }
+    let group: Vec<ShieldedAircraft> =
+        flown.iter().map(|&slot| shielded_aircraft(context, slot)).collect();
+    let Some(renewed) = renewed_fallbacks(&group) else { return };
+    for (&slot, fallback) in flown.iter().zip(renewed.fallbacks) {
+        state.airplanes[slot as usize].fallback.set(fallback);
+    }
+    for (i, j) in renewed.too_close {
+        state.exempt_pair(flown[i], flown[j]);
+        context.scratch.too_close.push((now, flown[i], flown[j]));
     }
 }
 

@@ -81,7 +81,7 @@ impl<'a> AircraftCycleMotion<'a> {
             _ => world.surface.frame_at(from.at),
         };
         let pose = frame.pose_to_local(from);
-        let air = world.flown_air(slot, context.now);
+        let air = world.flown_air(slot, context.now, (from.at, current.altitude_m.get()));
         let next = current.next.get() as usize;
         let mission = match &path {
             FlightPathSource::Profile { segment, .. } => {

@@ -54,7 +54,9 @@ pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flo
         let beside_m = |fallback| {
             altitude_beside_non_cooperative(context, slot, fallback, reach_m, &non_cooperative)
         };
-        let (altitude_m, fallback) = next_altitude(&all[k], reach_m, &all, beside_m);
+        let seen_at = all[k].pose.at;
+        let drift = |to_m| world.air_drift(seen_at, current.altitude_m.get(), to_m);
+        let (altitude_m, fallback) = next_altitude(&all[k], reach_m, &all, drift, beside_m);
         if altitude_m == reach_m {
             // Where it is not held, its altitudes do not depend on the lengths of the stages.
             state.clear_to(slot, segment.altitude_m);
@@ -65,6 +67,7 @@ pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flo
         current.fallback.set(fallback);
         all[k].fallback = fallback;
         all[k].levels = FlightLevelRange::between(current.altitude_m.get(), altitude_m);
+        all[k].drift = drift(altitude_m);
     }
 }
 

@@ -84,8 +84,9 @@ pub(super) fn store_maneuver(
 /// Moves the stored pose of an airplane along its orbit for one `dt`.
 fn advance_orbit_pose(context: &PhaseContext<'_>, slot: EntitySlot) {
     let PhaseContext { world, state, now, .. } = *context;
-    // Its orbit drifts with the air, as it does itself.
-    let air = world.flown_air(slot, now);
+    // Its orbit drifts with the air, as it does itself: with that where it is, even if errors have taken it off its orbit.
+    let current = &state.airplanes[slot as usize];
+    let air = world.flown_air(slot, now, (current.pose().at, current.altitude_m.get()));
     let fallback = state.airplanes[slot as usize].fallback.get();
     let v_m_s = state.segment(world, slot).model.v_m_s;
     let omega = fallback.omega_rad_s(world.orbit_rad_s[slot as usize]);

@@ -62,12 +62,13 @@ use super::traffic_state::{
 };
 use crate::flight::{FlightLevelRange, Pose2};
 use crate::shield::{
-    CommonPlan, ExemptIds, Fallback, OrbitSide, PlanCertainty, PlanEnding, PlanRules, SafeManeuver,
-    ShieldDecision, ShieldedAircraft, TurnProfile, filter_maneuvers_beside,
+    AirDrift, CommonPlan, ExemptIds, Fallback, OrbitSide, PlanCertainty, PlanEnding, PlanRules,
+    SafeManeuver, ShieldDecision, ShieldedAircraft, TurnProfile, filter_maneuvers_beside,
 };
 use serde::{Deserialize, Serialize};
 pub use setup::{ObservedAircraft, ShieldExchangeSetup};
 use sidestep_kernel::EntityId;
+use sidestep_kernel::geometry::sub;
 use std::sync::Arc;
 
 /// Messages between airplanes.
@@ -252,6 +253,7 @@ impl ShieldExchangeAgent {
         let Proposal { levels, orbit_pose, fallback, exempt, rank, .. } = proposal;
         let seen = &observed.aircraft;
         let v_m_s = proposal.v_m_s(observed);
+        let levels = levels.unwrap_or(observed.filed_levels);
         ShieldedAircraft {
             id: self.id(place),
             frame: self.setup.air.surface.frame_at(seen.pose.at),
@@ -262,7 +264,8 @@ impl ShieldExchangeAgent {
             orbit_rad_s: seen.orbit_rad_s,
             separation_m: seen.separation_m,
             error_m: seen.error_m,
-            levels: levels.unwrap_or(observed.filed_levels),
+            levels,
+            drift: self.drift_after(place, levels),
             vertical_m: self.setup.vertical_m,
             fallback: *fallback,
             choices: Arc::clone(&seen.choices),
@@ -271,6 +274,16 @@ impl ShieldExchangeAgent {
             rank: *rank,
             areas: seen.areas.clone(),
         }
+    }
+
+    /// Returns how the air around the airplane at a place moves, if it keeps or passes some levels in this `dt`.
+    fn drift_after(&self, place: usize, levels: FlightLevelRange) -> AirDrift {
+        let ObservedAircraft { aircraft, altitude_m, .. } = &self.setup.aircraft[place];
+        let Some(field) = &self.setup.wind_field else { return aircraft.drift };
+        let next_altitude_m = levels.end_of_change_m(*altitude_m);
+        let next_wind_m_s = field.velocity_m_s(aircraft.pose.at, next_altitude_m);
+        let next_m_s = sub(next_wind_m_s, self.setup.air.common_wind_m_s);
+        AirDrift { next_m_s, ..aircraft.drift }
     }
 
     /// Returns all orbits that an unheard airplane may be on.
@@ -526,7 +539,8 @@ impl ShieldExchangeAgent {
         contacts
     }
 
-    /// Returns the orbit at the end of a plan, where the wind has carried it: plans are made in still air.
+    /// Returns the orbit at the end of a plan, where the wind has carried it: plans are made in still air. A wind that differs
+    /// is not permitted where messages get lost, and nowhere else is this orbit looked at.
     fn orbit_after_plan(&self, plan: &SafeManeuver) -> OrbitState {
         let [wx, wy] = self.setup.air.wind_m_s.map(|w| w * self.setup.air.timing.dt_s);
         let mut pose = plan.end_pose();

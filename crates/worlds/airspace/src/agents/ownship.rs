@@ -39,6 +39,8 @@ pub struct CommonKnowledge {
     pub non_cooperative: Vec<NonCooperativeAircraft>,
     /// The areas to stay out of, or inside of.
     pub areas: Areas,
+    /// The wind around each of the group, in meters per second, in the order of the ids.
+    pub winds_m_s: Vec<Point>,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
     /// Factor on the cost of deviations of each of the group, in the order of the ids.
@@ -82,12 +84,17 @@ impl CommonKnowledge {
         };
         let route = RoutePosition { mission, next, pose: beacon.pose };
         let actions = actions_at_turn_rate(actions, filed, beacon.omega_max_rad_s);
-        let predictions = self.air.predictions(&model, &actions, route, None);
+        let predictions = self.air_around(place).predictions(&model, &actions, route, None);
         let frame = self.air.surface.frame_at(beacon.pose.at);
         ActionPredictions::new(predictions, frame, beacon.separation_m, beacon.levels)
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
             .with_areas(&self.area_context(), &self.objective, self.air.timing.dtau_s)
             .with_deviation_weight(self.deviation_weights[place])
+    }
+
+    /// Returns the air around the airplane at a place.
+    pub(super) fn air_around(&self, place: usize) -> FlightConditions {
+        FlightConditions { wind_m_s: self.winds_m_s[place], ..self.air }
     }
 
     /// Returns what is the same for all areas around the group.
@@ -250,8 +257,7 @@ impl Ownship {
     pub(crate) fn presumed_predictions(&self, other: usize) -> ActionPredictions {
         let id = self.common.ids[other];
         let filed = &self.common.filed[other].contact;
-        let frame = self.common.frame(other);
-        self.predictions_from_state(self.contacts.get(&id).unwrap_or(filed), frame)
+        self.predictions_from_state(self.contacts.get(&id).unwrap_or(filed), other)
     }
 
     /// Returns the same for one that was heard a moment ago.
@@ -261,11 +267,12 @@ impl Ownship {
         beacon: &StateBeacon,
     ) -> ActionPredictions {
         let contact = LastKnownState::from_beacon(beacon.clone(), self.common.now);
-        self.predictions_from_state(&contact, self.common.frame(other))
+        self.predictions_from_state(&contact, other)
     }
 
-    fn predictions_from_state(&self, contact: &LastKnownState, frame: Frame) -> ActionPredictions {
-        let CommonKnowledge { air, is_shielded, now, .. } = &*self.common;
-        contact.presumed_predictions(air, *is_shielded, *now, frame)
+    fn predictions_from_state(&self, contact: &LastKnownState, place: usize) -> ActionPredictions {
+        let CommonKnowledge { is_shielded, now, .. } = *self.common;
+        let frame = self.common.frame(place);
+        contact.presumed_predictions(&self.common.air_around(place), is_shielded, now, frame)
     }
 }

@@ -136,10 +136,11 @@ impl LastKnownState {
         now: Cycle,
         frame: Frame,
     ) -> ActionPredictions {
-        let points = match &self.presumed {
+        let mut points = match &self.presumed {
             Some(orbiting) if is_shielded => self.orbit_points(frame, air, orbiting, now),
             _ => self.straight_points(frame, air, now),
         };
+        air.move_to_common_air(&mut points);
         let prediction = Prediction { counted: points.len(), points };
         let separation_m = UNHEARD_SEPARATION_FACTOR * self.beacon.separation_m;
         ActionPredictions::new(vec![prediction], frame, separation_m, self.beacon.levels)

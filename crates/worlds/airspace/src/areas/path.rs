@@ -115,15 +115,16 @@ impl LocalArea {
         let is_moving = self.velocity_m_s != [0.0; 2];
         if piece.omega_rad_s == 0.0 {
             let ends = [from_s, until_s].map(|t_s| self.relative_place(piece.at(t_s), t_s));
-            return until_s < f64::INFINITY && self.line_distance_m(ends) >= margin_m;
+            // A line that crosses the border is 0 from it, which is no less than a margin of 0.
+            return until_s < f64::INFINITY && self.line_distance_m(ends) > margin_m;
         }
         let (center, radius_m) = piece.circle();
         if !is_moving {
-            return self.circle_distance_m(center, radius_m) >= margin_m;
+            return self.circle_distance_m(center, radius_m) > margin_m;
         }
         // The circle drifts along the border, and reaches to both sides of the path of its center.
         let ends = [from_s, until_s].map(|t_s| self.relative_place(center, t_s));
-        until_s < f64::INFINITY && self.line_distance_m(ends) >= margin_m + radius_m
+        until_s < f64::INFINITY && self.line_distance_m(ends) > margin_m + radius_m
     }
 
     /// Returns the distance of a straight line from the border, in meters.

@@ -18,8 +18,10 @@ pub struct AircraftState {
     pub at: Point,
     /// Heading in radians, counterclockwise from east.
     pub heading_rad: f64,
-    /// Velocity through the air in meters per second.
+    /// Velocity in meters per second, relative to the air around the airplane that sees it: of itself, through the air.
     pub velocity: Point,
+    /// Velocity of that air relative to the one that is common to all, in meters per second; 0 where all are in one wind.
+    pub(crate) drift: Point,
     /// The heading that it would have if it were alone, in radians.
     pub preferred_rad: f64,
     /// Distance in meters within which no other airplane should come; of those that avoid nobody, enlarged by how far
@@ -50,6 +52,7 @@ pub(crate) fn test_aircraft(slot: EntitySlot, at: Point, heading_rad: f64) -> Ai
         at,
         heading_rad,
         velocity: [35.0 * math::cos(heading_rad), 35.0 * math::sin(heading_rad)],
+        drift: [0.0; 2],
         preferred_rad: heading_rad,
         separation_m: 500.0,
         levels: FlightLevelRange::from_level(0.0),

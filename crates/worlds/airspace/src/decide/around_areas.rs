@@ -43,6 +43,7 @@ fn areas_ahead(world: &AirspaceWorld, aircraft: SteeredAircraft, more_s: f64) ->
     let reach_m = segment.model.v_m_s * seconds + segment.model.separation_m;
     let mut context = world.area_context(now, seconds);
     context.now_s += elapsed_s;
+    context.wind_m_s = world.air_around(known).wind_m_s;
     context.near(world.surface.frame_at(known.pose.at), known.pose.at, reach_m)
 }
 
@@ -66,7 +67,7 @@ pub(super) fn steer_around_areas(
         }
         (Steering::Proceed | Steering::Velocity(_), Some(goal)) => {
             let from = flight.pose.at;
-            let aim = world.flight_environment().aim_point(from, goal, v_m_s);
+            let aim = flight.air.aim_point(from, goal, v_m_s);
             // Beyond its way-point it flies elsewhere.
             let flight_s = distance_m(from, goal) / v_m_s;
             (math::atan2(aim[1] - from[1], aim[0] - from[0]), look_ahead_s.min(flight_s))

@@ -1,7 +1,8 @@
 //! An airplane of a group in its own frame.
 
 use crate::flight::{
-    AircraftModel, Autopilot, Frame, InterOrderSegment, KnownAircraft, Point, Pose2, RoutePosition,
+    AircraftModel, Autopilot, FlightConditions, Frame, InterOrderSegment, KnownAircraft, Point,
+    Pose2, RoutePosition,
 };
 use crate::world::AirspaceWorld;
 use std::borrow::Cow;
@@ -11,6 +12,8 @@ pub(super) struct LocalFlight<'a> {
     pub(super) model: &'a AircraftModel,
     pub(super) frame: Frame,
     pub(super) pose: Pose2,
+    /// The air around it.
+    pub(super) air: FlightConditions,
     /// The way-points of its route, as far as it can get.
     pub(super) mission: Cow<'a, [Point]>,
     /// Number of way-points done with.
@@ -25,12 +28,13 @@ impl<'a> LocalFlight<'a> {
         let pose = frame.pose_to_local(known.pose);
         let next = known.next;
         let route = RoutePosition { mission, next, pose };
-        let mission = world.flight_environment().local_mission(frame, model, route, seconds);
-        Self { model, frame, pose, mission, next }
+        let air = world.air_around(known);
+        let mission = air.local_mission(frame, model, route, seconds);
+        Self { model, frame, pose, air, mission, next }
     }
 
-    pub(super) fn autopilot(&self, world: &AirspaceWorld) -> Autopilot<'_> {
-        world.flight_environment().autopilot(self.model, &self.mission)
+    pub(super) fn autopilot(&self) -> Autopilot<'_> {
+        self.air.autopilot(self.model, &self.mission)
     }
 
     /// Returns its next way-point, if it has one.

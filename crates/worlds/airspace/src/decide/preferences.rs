@@ -2,7 +2,7 @@
 
 use super::local_flight::LocalFlight;
 use crate::agents::ActionChoice;
-use crate::flight::{Action, KnownAircraft, TurnAction};
+use crate::flight::{Action, KnownAircraft, TimeDiscretization, TurnAction};
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 
@@ -10,8 +10,7 @@ use crate::world::AirspaceWorld;
 /// it.
 pub(super) fn rank_straight_first(world: &AirspaceWorld, known: KnownAircraft) -> Vec<Action> {
     let flight = LocalFlight::new(world, known, world.timing.dtau_s);
-    let air = world.flight_environment();
-    let straight_rad_s = air.steer(&flight.autopilot(world), flight.pose, known.next);
+    let straight_rad_s = flight.air.steer(&flight.autopilot(), flight.pose, known.next);
     rank_by_turn_difference(world, known, straight_rad_s)
 }
 
@@ -75,7 +74,7 @@ pub(super) fn turn_profiles_from_actions(
     let flight = LocalFlight::new(world, known, world.timing.dt_s);
     let mut profiles: Vec<TurnProfile> = Vec::new();
     for &action in actions {
-        let profile = turn_profile(world, &flight, action.turn);
+        let profile = turn_profile(&flight, action.turn);
         if !profiles.contains(&profile) {
             profiles.push(profile);
         }
@@ -83,14 +82,14 @@ pub(super) fn turn_profiles_from_actions(
     profiles
 }
 
-fn turn_profile(world: &AirspaceWorld, flight: &LocalFlight<'_>, turn: TurnAction) -> TurnProfile {
-    let air = world.flight_environment();
-    let dtau_s = world.timing.dtau_s;
-    let autopilot = flight.autopilot(world);
+fn turn_profile(flight: &LocalFlight<'_>, turn: TurnAction) -> TurnProfile {
+    let air = flight.air;
+    let TimeDiscretization { dtau_s, .. } = air.timing;
+    let autopilot = flight.autopilot();
     let mut pose = flight.pose;
     let mut next = flight.next;
     let mut omegas_rad_s = Vec::new();
-    for k in 0..world.timing.points_per_dt() {
+    for k in 0..air.timing.points_per_dt() {
         let fixed_rad_s = turn.turn_rate_rad_s(k as f64 * dtau_s);
         let omega = fixed_rad_s.unwrap_or_else(|| air.steer(&autopilot, pose, next));
         omegas_rad_s.push(omega);

@@ -15,6 +15,7 @@ use crate::purpose;
 use crate::right_of_way::Yielding;
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
+use sidestep_kernel::geometry::{add, sub};
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, math};
 
@@ -251,7 +252,7 @@ impl<'a> TrafficView<'a> {
         let own = &all[own];
         let other = &all[other];
         if world.surface == Surface::Plane {
-            return Some(*other);
+            return Some(in_air_around(own, *other));
         }
         let settings = world.reactive_settings();
         let speeds_m_s = [own, other].map(|one| math::hypot(one.velocity[0], one.velocity[1]));
@@ -261,14 +262,15 @@ impl<'a> TrafficView<'a> {
             return None;
         }
         let Pose2 { at: [x_m, y_m], heading_rad: turn_rad } = own_frame.origin_of(other_frame);
-        Some(AircraftState {
+        let seen = AircraftState {
             // Of the one as it is, whose own position remains in coordinates.
             at: [own.at[0] + x_m, own.at[1] + y_m],
             heading_rad: other.heading_rad + turn_rad,
             velocity: rotated(other.velocity, turn_rad),
             preferred_rad: other.preferred_rad + turn_rad,
             ..*other
-        })
+        };
+        Some(in_air_around(own, seen))
     }
 
     /// Returns all other airplanes as one sees them.
@@ -308,11 +310,22 @@ impl CustomMethodContext<'_> {
             own,
             way_point_m: world.surface.frame_at(known.pose.at).to_local(mission[known.next]),
             omega_max_rad_s: model.omega_max_rad_s,
-            wind_m_s: world.wind_m_s,
+            wind_m_s: world.air_around(known).wind_m_s,
             others: &others,
         };
         method.decide(&percept, draws)
     }
+}
+
+/// Returns another airplane with its velocity relative to the air around one: where the two are in different winds, that of
+/// the other is carried along as well.
+fn in_air_around(own: &AircraftState, other: AircraftState) -> AircraftState {
+    // The same bits in one wind.
+    if own.drift == other.drift {
+        return other;
+    }
+    let velocity = sub(add(other.velocity, other.drift), own.drift);
+    AircraftState { velocity, drift: own.drift, ..other }
 }
 
 /// Returns an airplane with its position relative to an origin.
@@ -323,9 +336,8 @@ fn relative_to(origin: Point, one: &AircraftState) -> AircraftState {
 /// Flies one step as steered, and returns its turn rate.
 pub(super) fn step(world: &AirspaceWorld, known: &mut KnownAircraft, steering: Steering) -> f64 {
     let flight = LocalFlight::new(world, *known, world.timing.dtau_s);
-    let air = world.flight_environment();
-    let LocalFlight { model, pose, frame, .. } = flight;
-    let autopilot = flight.autopilot(world);
+    let LocalFlight { model, pose, frame, air, .. } = flight;
+    let autopilot = flight.autopilot();
     let omega_max_rad_s = model.omega_max_rad_s;
     let omega_rad_s = match steering {
         Steering::Proceed | Steering::Velocity([0.0, 0.0]) => {
@@ -372,6 +384,8 @@ fn non_cooperative_state(
         at,
         heading_rad: turned_rad,
         velocity: rotated(one.velocity_m_s, turned_rad - heading_rad),
+        // Its velocity is that in the common air.
+        drift: [0.0; 2],
         preferred_rad: turned_rad,
         separation_m: one.required_clearance_m(0.0),
         levels: one.levels,
@@ -395,7 +409,7 @@ fn aircraft_state(world: &AirspaceWorld, known: KnownAircraft) -> AircraftState 
     let v = model.v_m_s;
     let preferred_rad = flight.goal().map_or(heading_rad, |goal| {
         let from = flight.pose.at;
-        let aim = world.flight_environment().aim_point(from, goal, v);
+        let aim = flight.air.aim_point(from, goal, v);
         math::atan2(aim[1] - from[1], aim[0] - from[0])
     });
     AircraftState {
@@ -403,6 +417,7 @@ fn aircraft_state(world: &AirspaceWorld, known: KnownAircraft) -> AircraftState 
         at,
         heading_rad,
         velocity: [v * math::cos(heading_rad), v * math::sin(heading_rad)],
+        drift: flight.air.drift_m_s(),
         preferred_rad,
         separation_m: model.separation_m,
         levels: world.levels(known),

@@ -9,7 +9,7 @@ use crate::flown_leg::FlownLeg;
 use crate::measures::{PairMeasures, RelativeState, WellClearMinima};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::geometry::{norm_squared, sub};
-use sidestep_kernel::{Cycle, EntityId, math};
+use sidestep_kernel::{Cycle, EntityId};
 use std::ops::Range;
 
 /// Fraction of a step by which a leg may seem to begin after the step that it begins in, because of rounding.
@@ -375,7 +375,6 @@ impl FlownAircraft {
         let world = swept.world;
         let legs = &swept.flown[flown.clone()];
         let first = &legs[0];
-        let [wind_x, wind_y] = world.wind_m_s;
         let max_speed_m_s = legs.iter().map(|one| one.leg.v_m_s).fold(0.0, f64::max);
         // One that comes in later is not where it is compared with others.
         let begins_s = first.leg.from_s - swept.step_s(0);
@@ -390,7 +389,7 @@ impl FlownAircraft {
             steady_velocity: is_steady.then(|| first.leg.motion(first.leg.from_s).velocity),
             separation_m: world.airplanes[first.airplane as usize].model.separation_m,
             // A recorded airplane is not carried by the wind that carries the others.
-            max_speed_m_s: max_speed_m_s + math::hypot(wind_x, wind_y),
+            max_speed_m_s: max_speed_m_s + world.max_wind_m_s(),
             flown,
             prepared: None,
         }

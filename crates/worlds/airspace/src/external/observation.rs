@@ -223,7 +223,7 @@ fn delay_s(context: &PhaseContext<'_>, own: &KnownAircraft, ahead: &[Point]) -> 
         return 0.0;
     }
     let flown_s = world.cycle_start_s(*now) - world.cycle_start_s(world.first_controlled_cycle(i));
-    let air = world.flight_environment();
+    let air = world.air_around(*own);
     let v_m_s = world.segment(own.slot, own.orders).model.v_m_s;
     let mut from = own.pose.at;
     let mut left_s = 0.0;

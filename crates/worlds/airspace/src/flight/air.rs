@@ -1,13 +1,15 @@
 //! The air that all fly through: the steps of time, the rule for way-points, and the wind.
 //!
 //! In a wind, predictions are made in the moving air, toward way-points that drift; the real flight
-//! is over the ground.
+//! is over the ground. Where the wind differs, each airplane's are made in the air around it, and then stated in an air
+//! that is common to all, so that they can be compared.
 
 use super::action::Action;
 use super::autopilot::{AfterLastWaypoint, Autopilot, Prediction, WaypointRule};
 use super::change::{ChangeableFlight, SteadyChange};
 use super::motion::{AircraftModel, Point, Pose2, TimeDiscretization, distance_m};
 use super::surface::{Frame, Surface, way_point_reach_m};
+use sidestep_kernel::geometry::{add_scaled, sub};
 use sidestep_kernel::{interrupt, math};
 use std::borrow::Cow;
 
@@ -15,7 +17,7 @@ use std::borrow::Cow;
 /// leads 0.1 mm astray.
 const ALIGNED_RAD: f64 = 1e-10;
 
-/// The air: everything that is the same for all airplanes.
+/// The air that an airplane flies through.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlightConditions {
     /// Lengths of a cycle, of the steps in it, and of the horizon.
@@ -24,6 +26,9 @@ pub struct FlightConditions {
     pub passing: WaypointRule,
     /// The wind, which all know, in meters per second.
     pub wind_m_s: Point,
+    /// The velocity of the air in which predictions of different airplanes are compared, in meters per second: the wind
+    /// itself, unless that differs from level to level or from place to place.
+    pub common_wind_m_s: Point,
     /// The surface that all fly over.
     pub surface: Surface,
 }
@@ -75,6 +80,23 @@ impl FlightConditions {
 
     fn is_windless(&self) -> bool {
         self.wind_m_s == [0.0, 0.0]
+    }
+
+    /// Returns the velocity of this air relative to the common one, in meters per second.
+    pub(crate) fn drift_m_s(&self) -> Point {
+        sub(self.wind_m_s, self.common_wind_m_s)
+    }
+
+    /// Moves the points of a path, one after each step, from this air to the common one.
+    pub(crate) fn move_to_common_air(&self, points: &mut [Point]) {
+        // Where the wind is the same everywhere, this is the common air.
+        if self.wind_m_s == self.common_wind_m_s {
+            return;
+        }
+        let drift_m_s = self.drift_m_s();
+        for (k, point) in (1..).zip(points) {
+            *point = add_scaled(*point, drift_m_s, f64::from(k) * self.timing.dtau_s);
+        }
     }
 
     /// Returns the turn rate that leads to way-point `next` on the ground, corrected for the wind.
@@ -147,7 +169,8 @@ impl FlightConditions {
         Pose2 { at, ..pose }
     }
 
-    /// Returns where each action leads an airplane that is at a point of its route, in the frame of that point.
+    /// Returns where each action leads an airplane that is at a point of its route, in the frame of that point and in the
+    /// common air.
     ///
     /// Predictions are made in the moving air, where way-points drift. Over one horizon, each is taken where it will
     /// be when the airplane, flying straight, reaches it. `flight` is given where actions change level or speed.
@@ -172,12 +195,14 @@ impl FlightConditions {
             Some(flight) => flight.speeds(action.change),
             None => SteadyChange::constant(model.v_m_s),
         };
-        actions
-            .iter()
-            .map(|action| {
-                autopilot.predict_at_speeds(action.turn, speeds(action), (pose, next), &self.timing)
-            })
-            .collect()
+        let predicted = actions.iter().map(|action| {
+            autopilot.predict_at_speeds(action.turn, speeds(action), (pose, next), &self.timing)
+        });
+        let mut predictions: Vec<Prediction> = predicted.collect();
+        for prediction in &mut predictions {
+            self.move_to_common_air(&mut prediction.points);
+        }
+        predictions
     }
 
     /// Returns the seconds of a straight flight over the ground to `goal`.
@@ -237,7 +262,7 @@ mod tests {
             let mission: Vec<Point> = offsets_m.iter().map(|&offset| frame.to_world(offset)).collect();
             let timing = TimeDiscretization { dt_s: 10.0, dtau_s: 5.0, horizon: 30 };
             let passing = WaypointRule { tolerance_m: 1852.0, passes: true, passes_abeam };
-            let air = FlightConditions { timing, passing, wind_m_s: [0.0; 2], surface };
+            let air = FlightConditions { timing, passing, wind_m_s: [0.0; 2], common_wind_m_s: [0.0; 2], surface };
             let model = AircraftModel { v_m_s: 230.0, omega_max_rad_s: 0.02, separation_m: 9260.0, turns: 5 };
             let pose = Pose2 { at: [0.0; 2], heading_rad };
             let route = RoutePosition { mission: &mission, next, pose };

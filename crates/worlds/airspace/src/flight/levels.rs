@@ -25,6 +25,11 @@ impl FlightLevelRange {
         Self { low_m: a_m.min(b_m), high_m: a_m.max(b_m) }
     }
 
+    /// Returns the altitude at the end of a change of level that begins at another altitude of the range.
+    pub(crate) fn end_of_change_m(&self, from_m: f64) -> f64 {
+        if self.low_m < from_m { self.low_m } else { self.high_m }
+    }
+
     /// Returns these levels, another, and all between.
     #[must_use]
     pub fn extended_by_level(self, altitude_m: f64) -> Self {

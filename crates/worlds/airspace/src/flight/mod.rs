@@ -9,7 +9,7 @@
 //! track.rs  levels.rs                recorded tracks, and ranges of altitude
 //! leg.rs  proximity.rs               stretches of flight, how near two of them come, and how deep into each other's zone
 //! surface.rs  pair_plane.rs          a plane or the earth, and the planes in which motions are computed and compared
-//! gusts.rs                           a wind that no airplane knows
+//! wind.rs  gusts.rs                  a wind that differs from place to place, and one that no airplane knows
 //! chart.rs                           how positions are drawn
 //! ```
 
@@ -32,6 +32,7 @@ mod proximity;
 mod segment;
 mod surface;
 mod track;
+mod wind;
 
 pub(crate) use acceleration::SpeedChanges;
 pub(crate) use action::actions_at_turn_rate;
@@ -60,3 +61,5 @@ pub(crate) use proximity::{PairZones, Proximity};
 pub(crate) use segment::{InterOrderSegment, SegmentAfterOrder, segments_after_orders};
 pub use surface::{Frame, Surface, coordinates_from_degrees};
 pub use track::{Track, TrackPoint};
+pub use wind::WindField;
+pub(crate) use wind::{WindGridError, WindNode};

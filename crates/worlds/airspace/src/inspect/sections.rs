@@ -177,16 +177,14 @@ impl Inspector<'_> {
     fn turn_profile_line(&self, profile: &TurnProfile) -> MarkShape {
         // Orders are carried out before anything is flown.
         let v_m_s = self.after.segment(self.world, self.id).model.v_m_s;
-        let start: Pose2 = self.before.airplanes[self.id as usize].pose();
+        let current = &self.before.airplanes[self.id as usize];
+        let start: Pose2 = current.pose();
+        let air = self.world.air_at(start.at, current.altitude_m.get());
         let frame = self.world.surface.frame_at(start.at);
         let mut pose = frame.pose_to_local(start);
         let mut points = vec![start.at];
         for &omega in &profile.omegas_rad_s {
-            pose = self.world.flight_environment().after_wind_step(pose.step(
-                v_m_s,
-                omega,
-                self.world.timing.dtau_s,
-            ));
+            pose = air.after_wind_step(pose.step(v_m_s, omega, self.world.timing.dtau_s));
             points.push(frame.to_world(pose.at));
         }
         self.path_mark(&points)

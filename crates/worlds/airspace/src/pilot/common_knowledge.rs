@@ -27,6 +27,7 @@ pub(super) fn common_knowledge(
         filed: percept.group.iter().map(|one| filed_flight(world, one.id)).collect(),
         poses: percept.group.iter().map(|one| one.pose).collect(),
         air: world.flight_environment(),
+        winds_m_s: group.iter().map(|known| world.air_around(*known).wind_m_s).collect(),
         objective: world.objective,
         settings: world.settings,
         streams: world.streams,
@@ -135,6 +136,7 @@ pub(super) fn shield_exchange_setup(
         let filed_v_m_s = seen.v_m_s;
         let filed_levels = seen.levels;
         aircraft.push(ObservedAircraft {
+            altitude_m: one.altitude_m,
             aircraft: if one.id == percept.own.id {
                 percept.own.shielded_aircraft(world, percept.cycle)
             } else {
@@ -154,6 +156,7 @@ pub(super) fn shield_exchange_setup(
     }
     ShieldExchangeSetup {
         air: world.flight_environment(),
+        wind_field: world.wind_field.clone(),
         vertical_m: world.vertical_m,
         now: percept.cycle,
         certainty: plan_certainty(world),
@@ -218,6 +221,7 @@ fn shielded_aircraft_seen(
         separation_m: segment.model.separation_m,
         error_m: world.error_m(one.id as usize),
         levels: FlightLevelRange::between(one.altitude_m, segment.altitude_m),
+        drift: world.air_drift(one.pose.at, one.altitude_m, segment.altitude_m),
         vertical_m: world.vertical_m,
         fallback,
         choices: Arc::clone(&world.fallbacks[one.id as usize]),
@@ -225,7 +229,7 @@ fn shielded_aircraft_seen(
         exempt: exempt.into(),
         // Ranks are known from proposals only.
         rank: 0,
-        areas: world.areas_around(one.id, one.pose.at, now),
+        areas: world.areas_around(one.id, (one.pose.at, one.altitude_m), now),
     }
 }
 

@@ -90,6 +90,11 @@ impl OwnshipState {
             separation_m: segment.model.separation_m,
             error_m: world.error_m(self.id as usize),
             levels: self.levels,
+            drift: world.air_drift(
+                self.seen.at,
+                self.altitude_m,
+                self.levels.end_of_change_m(self.altitude_m),
+            ),
             vertical_m: world.vertical_m,
             fallback: self.fallback,
             choices: Arc::clone(&world.fallbacks[self.id as usize]),
@@ -102,7 +107,7 @@ impl OwnshipState {
                 &KnownAircraft { pose: self.pose, ..self.as_known_aircraft() },
                 self.refusals,
             ),
-            areas: world.areas_around(self.id, self.seen.at, now),
+            areas: world.areas_around(self.id, (self.seen.at, self.altitude_m), now),
         }
     }
 

@@ -164,7 +164,7 @@ impl Compiler<'_> {
     }
 
     /// Returns how positions of a file on the earth become coordinates of the scenario.
-    fn coordinates_of_file(
+    pub(super) fn coordinates_of_file(
         &self,
         path: &Path,
         surface: Surface,

@@ -2,6 +2,7 @@
 
 use super::detours::DetourRules;
 use super::start_groups::largest_start_group;
+use super::winds::CompiledWind;
 use super::{AirspaceFile, CompiledAirspace, ParsedScenario, Preset};
 use crate::flight::AirplaneStart;
 use crate::flight::{FlightLevelRange, MAX_STEPS_PER_DT};
@@ -91,6 +92,7 @@ impl<'a> Compiler<'a> {
         let fallbacks = Arc::new(fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
         world.later_rules = Arc::new(self.later_rules(&world)?);
+        self.check_wind_field(&world)?;
         self.check_earth(&world)?;
         let head = &self.recipe.head;
         let cycles = head.cycles.unwrap_or_else(|| cycle_limit(&world));
@@ -155,9 +157,11 @@ impl<'a> Compiler<'a> {
             .iter()
             .map(|settings| settings.look_ahead_s)
             .fold(timing.horizon_s(), f64::max);
+        let CompiledWind { wind_m_s, field: wind_field } = self.wind(surface, &airplanes)?;
         let world = AirspaceWorld {
             network: self.network(&timing, &airplanes)?,
-            wind_m_s: self.wind_m_s(&airplanes)?,
+            wind_m_s,
+            wind_field,
             gusts: self.gusts(&timing, &airplanes)?,
             passing,
             airplanes: Arc::new(airplanes),
@@ -273,34 +277,6 @@ impl<'a> Compiler<'a> {
         );
         let remedy = "give a smaller heading_noise_deg or error_sigmas, or set shield = \"off\"";
         error(&cause, remedy)
-    }
-
-    /// Returns the wind, if every airplane can fly against it.
-    fn wind_m_s(&self, airplanes: &[AirplaneStart]) -> Result<[f64; 2], InputError> {
-        let given = self.file.airspace.wind_m_s.as_ref();
-        let wind_m_s = given.map_or([0.0; 2], |given| given.get_ref().get());
-        self.check_wind(wind_m_s, given.map(Spanned::span), airplanes)?;
-        Ok(wind_m_s)
-    }
-
-    /// Refuses a wind against which an airplane cannot fly.
-    pub(super) fn check_wind(
-        &self,
-        wind_m_s: [f64; 2],
-        span: Option<std::ops::Range<usize>>,
-        airplanes: &[AirplaneStart],
-    ) -> Result<(), InputError> {
-        let min_speed_m_s = airplanes
-            .iter()
-            .flat_map(AirplaneStart::planned_speeds_m_s)
-            .fold(f64::INFINITY, f64::min);
-        let wind_speed_m_s = sidestep_kernel::math::hypot(wind_m_s[0], wind_m_s[1]);
-        if wind_speed_m_s < min_speed_m_s {
-            return Ok(());
-        }
-        let cause = format!("a wind of {wind_speed_m_s} m/s, and airplanes of {min_speed_m_s} m/s");
-        let remedy = "give a wind that all airplanes can fly against";
-        Err(self.source.error(span, cause, remedy))
     }
 
     /// Sets the height that is enough between levels.
@@ -493,16 +469,19 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Fallback>, Vec<(u32, u32)>)
     let mut group = Vec::with_capacity(starts.len());
     for (rank, &i) in starts.iter().enumerate() {
         let airplane = &world.airplanes[i];
+        let altitude_m = airplane.altitude_m;
+        let seen = observed_pose(world, i as u32, 0, airplane.start);
         group.push(ShieldedAircraft {
-            frame: world.surface.frame_at(observed_pose(world, i as u32, 0, airplane.start).at),
-            pose: observed_pose(world, i as u32, 0, airplane.start),
-            orbit_pose: observed_pose(world, i as u32, 0, airplane.start),
+            frame: world.surface.frame_at(seen.at),
+            pose: seen,
+            orbit_pose: seen,
             v_m_s: airplane.model.v_m_s,
             omega_max_rad_s: airplane.model.omega_max_rad_s,
             orbit_rad_s: world.orbit_rad_s[i],
             separation_m: airplane.model.separation_m,
             error_m: world.error_m(i),
-            levels: FlightLevelRange::from_level(airplane.altitude_m),
+            levels: FlightLevelRange::from_level(altitude_m),
+            drift: world.air_drift(seen.at, altitude_m, altitude_m),
             vertical_m: world.vertical_m,
             fallback: Fallback::default(),
             choices: Arc::clone(&world.fallbacks[i]),
@@ -510,11 +489,7 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Fallback>, Vec<(u32, u32)>)
             exempt: ExemptIds::default(),
             rank: rank as u64,
             id: i as u32,
-            areas: world.areas_around(
-                i as u32,
-                observed_pose(world, i as u32, 0, airplane.start).at,
-                0,
-            ),
+            areas: world.areas_around(i as u32, (seen.at, altitude_m), 0),
         });
     }
     let (chosen, pairs) = first_fallbacks(&group);

@@ -121,7 +121,7 @@ mod tests {
         for gusts in [ALL, EACH] {
             let airspace = format!("method = \"none\"\nshield = \"off\"\n{gusts}");
             let mut run = run(&airspace, alone).expect("right");
-            let [east_m_s, north_m_s] = run.world().flown_air(0, 0).wind_m_s;
+            let [east_m_s, north_m_s] = run.world().flown_air(0, 0, ([0.0; 2], 0.0)).wind_m_s;
             run.advance(1);
             let [x, y] = run.state().airplanes[0].pose().at;
             assert!(

@@ -5,11 +5,13 @@
 
 use super::compile::Compiler;
 use super::optimizer::{MvpSection, OnOffSwitch};
+use super::winds::WindLayerSection;
 use crate::flight::segments_after_orders;
 use crate::settings::{BuiltInMethod, Deployment, LevelGap, SeparationM};
 use crate::world::AirspaceWorld;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use sidestep_kernel::geometry::norm;
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_scenario::{Closed, Number, Point, Spanned};
 use std::sync::Arc;
@@ -32,7 +34,10 @@ pub(super) struct RuleChangeSection {
     /// Distance that the airplanes keep; without airplanes, those that have none of their own.
     separation_m: Option<SeparationM>,
     vertical_m: Option<Number<LevelGap>>,
+    /// A wind that is the same everywhere.
     wind_m_s: Option<Point<2>>,
+    /// Winds by altitude.
+    winds: Vec<Spanned<WindLayerSection>>,
     /// Whether the airplanes avoid nobody.
     non_cooperative: Option<bool>,
 }
@@ -44,6 +49,7 @@ impl RuleChangeSection {
             || self.mvp.is_some()
             || self.vertical_m.is_some()
             || self.wind_m_s.is_some()
+            || !self.winds.is_empty()
     }
 
     fn is_for_airplanes(&self) -> bool {
@@ -116,8 +122,7 @@ impl Compiler<'_> {
         let error =
             |cause: &str, remedy: &str| Err(self.source.error(Some(change.span()), cause, remedy));
         if !section.is_for_all() && !section.is_for_airplanes() {
-            let remedy =
-                "give method, shield, mvp, separation_m, vertical_m, wind_m_s or non_cooperative";
+            let remedy = "give method, shield, mvp, separation_m, vertical_m, wind_m_s, winds or non_cooperative";
             return error("a change of nothing", remedy);
         }
         if section.airplanes.is_some() && (section.is_for_all() || !section.is_for_airplanes()) {
@@ -143,8 +148,21 @@ impl Compiler<'_> {
             self.set_vertical_m(world, vertical_m.get());
         }
         if let Some(wind_m_s) = &section.wind_m_s {
-            self.check_wind(wind_m_s.get(), Some(change.span()), &world.airplanes)?;
+            let speed_m_s = norm(wind_m_s.get());
+            self.check_wind(speed_m_s, Some(change.span()), &world.airplanes)?;
             world.wind_m_s = wind_m_s.get();
+            // From then on it is the same everywhere.
+            world.wind_field = None;
+        }
+        if !section.winds.is_empty() {
+            if section.wind_m_s.is_some() {
+                let remedy = "give one of wind_m_s and winds";
+                return error("a wind that is given in two ways", remedy);
+            }
+            let field = self.field_of_layers(&section.winds, world.surface)?;
+            self.check_field_speed(&field, change.span(), &world.airplanes)?;
+            world.wind_m_s = field.middle_m_s;
+            world.wind_field = Some(Arc::new(field));
         }
         if section.is_for_airplanes() {
             self.change_airplanes(world, change, has_own)?;

@@ -66,7 +66,7 @@ fn some_area(velocity_m_s: BoxedStrategy<[f64; 2]>) -> impl Strategy<Value = Str
     )
 }
 
-fn some_areas(velocity_m_s: BoxedStrategy<[f64; 2]>) -> impl Strategy<Value = String> {
+pub(crate) fn some_areas(velocity_m_s: BoxedStrategy<[f64; 2]>) -> impl Strategy<Value = String> {
     prop::collection::vec(some_area(velocity_m_s), 1..4).prop_map(|all| all.concat())
 }
 
@@ -74,7 +74,7 @@ fn at_rest() -> BoxedStrategy<[f64; 2]> {
     Just([0.0; 2]).boxed()
 }
 
-fn moving() -> BoxedStrategy<[f64; 2]> {
+pub(crate) fn moving() -> BoxedStrategy<[f64; 2]> {
     [-25.0f64..25.0, -25.0f64..25.0].boxed()
 }
 

@@ -1,5 +1,6 @@
 //! Fallbacks of airplanes that enter, or that are about to change speed or level, and how far they may change that.
 
+use super::drift::AirDrift;
 use super::fallback::Fallback;
 use super::neighbors::neighbors;
 use super::shielded_aircraft::{MARGIN_M, ShieldedAircraft};
@@ -96,49 +97,26 @@ fn stored_first(aircraft: &ShieldedAircraft) -> impl Iterator<Item = Fallback> {
 /// do.
 ///
 /// The shield keeps it apart from those whose levels it is on already, so it can always stay where it is.
+///
+/// `drift` is how its air moves if it comes to an altitude by the end of this `dt`. Where that differs from level to level,
+/// a level short of those in the way is one in another wind, in which its fallback has to be apart anew.
 pub(crate) fn next_altitude(
     changing: &ShieldedAircraft,
     to_m: f64,
     others: &[ShieldedAircraft],
+    drift: impl Fn(f64) -> AirDrift,
     limit_m: impl Fn(Fallback) -> f64,
 ) -> (f64, Fallback) {
-    // Between two `dt` it is on one level.
     let from_m = changing.levels.low_m;
-    // In steps of `dtau` it may come out beyond `to_m` by what is rounded.
-    let beyond_m = to_m + CLIMB_ROUNDING_M * (to_m - from_m).signum();
-    let passing = ShieldedAircraft {
-        levels: FlightLevelRange::between(from_m, beyond_m),
-        ..changing.clone()
-    };
-    let met: Vec<&ShieldedAircraft> =
-        others.iter().filter(|other| passing.is_protected_from(other)).collect();
-    // `None` where it would lose the fallback that keeps it apart from those on its own level.
+    let whole = LevelChange::new(changing, to_m, drift(to_m), others);
     let altitude_m = |fallback: Fallback| {
-        let mut free_m = limit_m(fallback);
-        for area in passing.areas_on_levels() {
-            let is_met_now = area.is_on_levels(&changing.levels);
-            // By the invariant; and where it is exempt, a change of level brings it no nearer.
-            let is_kept_clear = is_met_now && fallback == changing.fallback;
-            if is_kept_clear || passing.is_fallback_clear(fallback, area) {
-                continue;
-            }
-            if is_met_now {
-                return None;
-            }
-            free_m = altitude_short_of(area.levels(), 0.0, from_m, free_m);
-        }
-        for &other in &met {
-            let is_met_now = changing.is_protected_from(other);
-            // By the invariant; with errors of position the two need not be seen apart anew.
-            let is_kept_apart = is_met_now && fallback == changing.fallback;
-            if is_kept_apart || passing.do_fallbacks_stay_apart(fallback, other, other.fallback) {
-                continue;
-            }
-            if is_met_now {
-                return None;
-            }
-            let vertical_m = passing.vertical_m.max(other.vertical_m);
-            free_m = altitude_short_of(other.levels, vertical_m, from_m, free_m);
+        let mut free_m = whole.free_altitude_m(fallback, limit_m(fallback))?;
+        let mut drift_m_s = whole.passing.drift;
+        // Each time it stops short of more of the others, or goes where it has been found free, so this ends.
+        while free_m != from_m && drift(free_m) != drift_m_s {
+            drift_m_s = drift(free_m);
+            let shorter = LevelChange::new(changing, free_m, drift_m_s, others);
+            free_m = shorter.free_altitude_m(fallback, free_m)?;
         }
         Some(free_m)
     };
@@ -154,6 +132,69 @@ pub(crate) fn next_altitude(
         }
     }
     best
+}
+/// A change of level in one `dt`.
+struct LevelChange<'a> {
+    /// The airplane before it.
+    changing: &'a ShieldedAircraft,
+    /// The airplane on all levels that it passes, in the winds that it comes to.
+    passing: ShieldedAircraft,
+    /// The others whose levels it meets.
+    met: Vec<&'a ShieldedAircraft>,
+}
+
+impl<'a> LevelChange<'a> {
+    /// Returns the change to an altitude, where the air moves like that.
+    fn new(
+        changing: &'a ShieldedAircraft,
+        to_m: f64,
+        drift: AirDrift,
+        others: &'a [ShieldedAircraft],
+    ) -> Self {
+        // Between two `dt` it is on one level.
+        let from_m = changing.levels.low_m;
+        // In steps of `dtau` it may come out beyond `to_m` by what is rounded.
+        let beyond_m = to_m + CLIMB_ROUNDING_M * (to_m - from_m).signum();
+        let levels = FlightLevelRange::between(from_m, beyond_m);
+        let passing = ShieldedAircraft { levels, drift, ..changing.clone() };
+        let met = others.iter().filter(|other| passing.is_protected_from(other)).collect();
+        Self { changing, passing, met }
+    }
+
+    /// Returns the altitude up to which it may go with a fallback, and at most to `limit_m`; `None` where it would lose the
+    /// fallback that keeps it apart from those on its own level.
+    fn free_altitude_m(&self, fallback: Fallback, limit_m: f64) -> Option<f64> {
+        let Self { changing, passing, met, .. } = self;
+        let from_m = changing.levels.low_m;
+        let mut free_m = limit_m;
+        for area in passing.areas_on_levels() {
+            let is_met_now = area.is_on_levels(&changing.levels);
+            // By the invariant; and where it is exempt, a change of level brings it no nearer.
+            let is_kept_clear = is_met_now && fallback == changing.fallback;
+            if is_kept_clear || passing.is_fallback_clear(fallback, area) {
+                continue;
+            }
+            if is_met_now {
+                return None;
+            }
+            free_m = altitude_short_of(area.levels(), 0.0, from_m, free_m);
+        }
+        let stays_in_wind = passing.drift == changing.drift;
+        for &other in met {
+            let is_met_now = changing.is_protected_from(other);
+            // By the invariant; with errors of position the two need not be seen apart anew.
+            let is_kept_apart = is_met_now && stays_in_wind && fallback == changing.fallback;
+            if is_kept_apart || passing.do_fallbacks_stay_apart(fallback, other, other.fallback) {
+                continue;
+            }
+            if is_met_now {
+                return None;
+            }
+            let vertical_m = passing.vertical_m.max(other.vertical_m);
+            free_m = altitude_short_of(other.levels, vertical_m, from_m, free_m);
+        }
+        Some(free_m)
+    }
 }
 
 /// Returns the altitude in meters, between `from_m` and `to_m`, up to which a change of level stays off the levels of

@@ -221,6 +221,11 @@ impl FallbackPath {
         &self.orbit
     }
 
+    /// Returns its speed through the air in meters per second.
+    pub(super) fn v_m_s(&self) -> f64 {
+        self.v_m_s
+    }
+
     /// Returns the time until the orbit begins, in seconds.
     pub(crate) fn lead_s(&self) -> f64 {
         self.lead_s

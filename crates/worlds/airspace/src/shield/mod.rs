@@ -43,7 +43,7 @@
 //!    clear.
 //!
 //! By induction over `dt` no pair that is not exempt ever loses separation. In a plane, a wind that all know
-//! moves all alike and changes no distance. On the earth each pair is compared in a plane of its own, and
+//! moves all alike and changes no distance; `shear.rs` has what is proved of pairs that fly in different winds. On the earth each pair is compared in a plane of its own, and
 //! `curvature.rs` has the margin for what that leaves. `errors.rs` has the margin that errors of position and
 //! heading add to `R`, and `avoid.rs` the guarantee beside non-cooperative aircraft. Each step is
 //! a property test in `tests.rs`, the whole one in `guarantee_tests.rs`, and among areas in `area_tests.rs`.
@@ -64,6 +64,7 @@ mod change;
 mod curvature;
 #[cfg(test)]
 mod delay_tests;
+mod drift;
 mod errors;
 mod fallback;
 #[cfg(test)]
@@ -72,14 +73,18 @@ mod neighbors;
 mod orbit;
 mod safe_maneuver;
 mod search;
+mod shear;
 mod shielded_aircraft;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod wind_tests;
 
 pub(crate) use change::{
     altitude_short_of, entry_fallbacks, first_fallbacks, next_altitude, safe_fallback,
 };
 pub(crate) use curvature::curvature_error_m;
+pub use drift::AirDrift;
 pub use errors::ErrorBounds;
 pub(crate) use errors::{OrbitTracker, common_orbit_rates};
 pub use fallback::Fallback;
@@ -89,5 +94,6 @@ pub(crate) use safe_maneuver::SafeManeuver;
 pub use safe_maneuver::{CommonPlan, TurnProfile};
 pub(crate) use search::filter_maneuvers_beside;
 pub use search::{PlanCertainty, PlanEnding, PlanRules, ShieldDecision, filter_maneuvers};
+pub(crate) use shear::renewed_fallbacks;
 pub(crate) use shielded_aircraft::ExemptIds;
 pub use shielded_aircraft::ShieldedAircraft;

@@ -93,6 +93,11 @@ impl Orbit {
         Self { center, phase_rad: motion.angle_rad(self.phase_rad), ..*self }
     }
 
+    /// Returns the same orbit about another center.
+    pub(super) fn displaced(&self, offset_m: Point) -> Self {
+        Self { center: [self.center[0] + offset_m[0], self.center[1] + offset_m[1]], ..*self }
+    }
+
     /// Returns the same orbit with times that start some seconds later.
     pub(super) fn after(&self, t_s: f64) -> Self {
         Self { phase_rad: self.phase_rad + self.omega_rad_s * t_s, ..*self }

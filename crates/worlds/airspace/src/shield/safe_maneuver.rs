@@ -6,6 +6,7 @@ use super::shielded_aircraft::ShieldedAircraft;
 use crate::areas::{PathPiece, profile_pieces};
 use crate::flight::{Frame, PairPlane, Point, Pose2, distance_m};
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::geometry::{add_scaled, norm, sub};
 use sidestep_kernel::interrupt;
 use std::sync::Arc;
 
@@ -102,6 +103,20 @@ impl ProfileMotion {
         })
     }
 
+    /// Returns the same in different winds, in which the other one drifts as it is seen from this one's air.
+    fn stays_apart_in_shear(&self, other: &Self, gap_m: f64) -> bool {
+        let drift_m_s = sub(other.aircraft.drift.now_m_s, self.aircraft.drift.now_m_s);
+        let closing_m_s = self.aircraft.v_m_s + other.aircraft.v_m_s + norm(drift_m_s);
+        (0..self.omegas_rad_s.len()).all(|k| {
+            let from_s = k as f64 * self.dtau_s;
+            let apart_m = |t_s: f64| {
+                let others = add_scaled(other.position_in_step(k, t_s), drift_m_s, from_s + t_s);
+                norm(sub(others, self.position_in_step(k, t_s)))
+            };
+            stays_apart_for(&apart_m, self.dtau_s, closing_m_s, gap_m)
+        })
+    }
+
     /// Returns its position some seconds after the start of a step.
     // Inlined, because the search of an approach asks for it twice in each of its steps.
     #[inline]
@@ -183,16 +198,33 @@ impl SafeManeuver {
         }
         let gap_m = own.required_gap_m(others);
         interrupt::check();
+        if own.is_in_shear_with(others) {
+            return self.is_compatible_in_shear(other, gap_m);
+        }
         let plane = own.pair_plane(others);
         let [path, other_path] = FallbackPath::both_in_plane(&plane, [self.path, other.path]);
         path.stays_apart(&other_path, gap_m)
             && self.motion.stays_apart(&other.motion, &plane, gap_m)
     }
 
+    /// Returns whether two plans of airplanes in different winds stay apart during `dt`, and after it for as long as the
+    /// shield looks ahead, or at least until their stored fallbacks would come too near each other; see `shear.rs`.
+    fn is_compatible_in_shear(&self, other: &Self, gap_m: f64) -> bool {
+        if !self.motion.stays_apart_in_shear(&other.motion, gap_m) {
+            return false;
+        }
+        let own = self.aircraft();
+        let others = other.aircraft();
+        let conflict_s = own.path_conflict_with_s(self.path, others, other.path);
+        conflict_s == f64::INFINITY
+            || conflict_s >= own.fallback_conflict_with_s(own.fallback, others, others.fallback)
+    }
+
     /// Returns whether it keeps apart from another airplane however that one flies, for one `dt`
     /// and on orbits forever after it. Of plans that do not orbit at once after that it is not known.
     pub(crate) fn is_clear_of(&self, other: &ShieldedAircraft) -> bool {
-        if !self.fallback.is_orbiting() {
+        // Nor where their orbits drift apart or together.
+        if !self.fallback.is_orbiting() || self.aircraft().is_in_shear_with(other) {
             return false;
         }
         let ProfileMotion { aircraft, poses, dtau_s, .. } = &*self.motion;

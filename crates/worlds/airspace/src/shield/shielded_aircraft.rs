@@ -1,5 +1,6 @@
 //! An airplane as the shield knows it.
 
+use super::drift::AirDrift;
 use super::fallback::{Fallback, FallbackPath};
 use super::orbit::{Orbit, OrbitSide};
 use crate::areas::LocalAreas;
@@ -37,6 +38,8 @@ pub struct ShieldedAircraft {
     pub error_m: f64,
     /// The levels it keeps or passes in the next `dt`.
     pub levels: FlightLevelRange,
+    /// How its air moves relative to that of others.
+    pub drift: AirDrift,
     /// Difference of altitude in meters from which on airplanes need not avoid each other.
     pub vertical_m: f64,
     /// Its stored fallback.
@@ -106,13 +109,18 @@ impl ShieldedAircraft {
         FallbackPath::new(pose, self.v_m_s, self.orbit_rad_s, fallback, self.dt_s)
     }
 
-    /// Returns whether a fallback of it and one of another airplane stay apart forever.
+    /// Returns whether a fallback of it and one of another airplane stay apart forever, or, where they are in different
+    /// winds, for as long as the shield looks ahead.
     pub(super) fn do_fallbacks_stay_apart(
         &self,
         fallback: Fallback,
         other: &Self,
         other_fallback: Fallback,
     ) -> bool {
+        if self.is_in_shear_with(other) {
+            let conflict_s = self.fallback_conflict_with_s(fallback, other, other_fallback);
+            return conflict_s == f64::INFINITY;
+        }
         let paths = [self.fallback_path(fallback), other.fallback_path(other_fallback)];
         let [own, others] = FallbackPath::both_in_plane(&self.pair_plane(other), paths);
         own.stays_apart(&others, self.required_gap_m(other))
@@ -129,7 +137,8 @@ impl ShieldedAircraft {
     pub(super) fn can_come_too_near(&self, other: &Self, lead_s: [f64; 2]) -> bool {
         let limit_m = self.required_gap_m(other)
             + self.reach_m(self.dt_s + lead_s[0])
-            + other.reach_m(other.dt_s + lead_s[1]);
+            + other.reach_m(other.dt_s + lead_s[1])
+            + self.shear_reach_m(other);
         self.is_within(other, limit_m)
     }
 
@@ -139,7 +148,7 @@ impl ShieldedAircraft {
     }
 
     /// Returns the longest time until it orbits, on its stored fallback or on one that it may choose, in seconds.
-    fn max_lead_s(&self) -> f64 {
+    pub(super) fn max_lead_s(&self) -> f64 {
         let choices = self.choices.iter().map(|choice| choice.cycles_until_orbit());
         let cycles = choices.fold(self.fallback.cycles_until_orbit(), u32::max);
         f64::from(cycles) * self.dt_s
@@ -148,7 +157,11 @@ impl ShieldedAircraft {
     /// Returns the distance from where it is seen within which its fallbacks, and the gap around them, lie, in meters.
     pub(super) fn fallback_reach_m(&self) -> f64 {
         // The error twice: within one its stored fallback begins, and the other is a part of the gap.
-        self.reach_m(self.max_lead_s()) + self.separation_m + 2.0 * self.error_m + MARGIN_M
+        self.reach_m(self.max_lead_s())
+            + self.separation_m
+            + 2.0 * self.error_m
+            + MARGIN_M
+            + self.drift_reach_m()
     }
 
     /// Returns the same for its plans.

@@ -40,6 +40,7 @@ fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
         separation_m: 500.0,
         error_m: 0.0,
         levels: FlightLevelRange::from_level(0.0),
+        drift: AirDrift::default(),
         vertical_m: 300.0,
         fallback: Fallback::default(),
         choices: choices(MAX_LEAD_S),
@@ -116,7 +117,7 @@ proptest! {
         for (k, (_, to_m)) in levels_m.iter().enumerate().take(group.len()) {
             let changing = group[k].clone();
             let from_m = changing.levels.low_m;
-            let (altitude_m, fallback) = next_altitude(&changing, *to_m, &group, |_| *to_m);
+            let (altitude_m, fallback) = next_altitude(&changing, *to_m, &group, |_| AirDrift::default(), |_| *to_m);
             prop_assert!((from_m.min(*to_m)..=from_m.max(*to_m)).contains(&altitude_m), "{from_m} {altitude_m} {to_m}");
             let is_safe = |altitude_m: f64, fallback: Fallback| {
                 let levels = FlightLevelRange::between(from_m, altitude_m);

@@ -9,7 +9,7 @@ use super::flyable_aircraft::{
     FlyableScnAircraft, aircraft_at_flying_speed, commands_from_changes,
 };
 use super::import_settings::{
-    ImportedChange, ImportedRules, ImportedScenarioSettings, import_settings,
+    ImportedChange, ImportedRules, ImportedScenarioSettings, ImportedWind, import_settings,
 };
 use super::imported_types::{ClipCounts, ClippedFlight, ImportedTypes, TypedFlight};
 use super::position::{origin_text, path_of_heading, position_text, positions_text};
@@ -91,8 +91,8 @@ fn settings_text(settings: &ImportedScenarioSettings) -> String {
     if start.is_bare {
         text.push_str("shield = \"off\"\n");
     }
-    if let Some(wind_m_s) = start.wind_m_s {
-        let _ = writeln!(text, "wind_m_s = {wind_m_s:?}");
+    if let Some(wind) = &start.wind {
+        let _ = writeln!(text, "{}", wind.key_text());
     }
     if !settings.changes.is_empty() {
         text.push_str("changes = [\n");
@@ -135,7 +135,7 @@ struct FlightContext<'a> {
     /// Time at which the file ends the simulation, and all leave.
     ends_s: Option<f64>,
     /// The winds, each from its time on.
-    winds: &'a [(f64, [f64; 2])],
+    winds: &'a [(f64, ImportedWind)],
     types: &'a ImportedTypes,
 }
 
@@ -245,7 +245,7 @@ fn write_own_settings(text: &mut String, aircraft: &ScnAircraft) {
 fn flight_commands(
     aircraft: &ScnAircraft,
     has_route: bool,
-    winds: &[(f64, [f64; 2])],
+    winds: &[(f64, ImportedWind)],
 ) -> Vec<(f64, FlightCommand)> {
     let mut orders: Vec<(f64, FlightCommand)> = Vec::new();
     let mut routed_s: Vec<f64> = route_command_times_s(aircraft);
@@ -287,15 +287,19 @@ fn flight_commands(
 fn turn_headings_to_tracks(
     orders: &mut [(f64, FlightCommand)],
     aircraft: &ScnAircraft,
-    winds: &[(f64, [f64; 2])],
+    winds: &[(f64, ImportedWind)],
 ) {
     let mut v_m_s = aircraft.speed.true_airspeed_mps(aircraft.altitude_ft);
+    let mut level_m = aircraft.altitude_ft * FOOT_M;
     for (at_s, command) in orders {
         match command {
             FlightCommand::Speed(new_m_s) => v_m_s = *new_m_s,
+            // It flies most of the way to its next command on the level that it is sent to.
+            FlightCommand::Altitude(altitude_m, _) => level_m = *altitude_m,
             FlightCommand::Heading(deg) => {
                 let blowing = winds.iter().rfind(|(from_s, _)| from_s <= at_s);
-                if let Some((_, [east_m_s, north_m_s])) = blowing.filter(|(_, w)| *w != [0.0; 2]) {
+                let wind_m_s = blowing.map(|(_, wind)| wind.at_altitude_m_s(level_m));
+                if let Some([east_m_s, north_m_s]) = wind_m_s.filter(|wind| *wind != [0.0; 2]) {
                     let (sin, cos) = math::sin_cos(deg.to_radians());
                     let track_rad = math::atan2(v_m_s * sin + north_m_s, v_m_s * cos + east_m_s);
                     *deg = track_rad.to_degrees();

@@ -5,6 +5,7 @@ use super::{FOOT_M, KNOT_M_S, MVP_LOOK_AHEAD_S, NAUTICAL_MILE_M};
 use sidestep_import::bluesky::{
     AircraftSetting, ResolutionMethod, ScnAircraft, ScnFile, Setting, TimedSetting, Wind,
 };
+use sidestep_kernel::geometry::{lerp, norm};
 use sidestep_kernel::{InputError, math};
 use std::fmt::Write;
 
@@ -18,9 +19,17 @@ pub(crate) struct ImportedRules {
     /// nothing about either.
     pub(super) look_ahead_s: Option<f64>,
     pub(super) resolution_factor: Option<f64>,
-    pub(super) wind_m_s: Option<[f64; 2]>,
+    pub(super) wind: Option<ImportedWind>,
     pub(super) separation_m: f64,
     pub(super) vertical_m: f64,
+}
+
+/// A wind at some altitudes, one and the same in all places.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct ImportedWind {
+    /// By rising altitude in meters, each to the east and to the north in meters per second; a single one at all altitudes,
+    /// and none in still air.
+    layers: Vec<(f64, [f64; 2])>,
 }
 
 /// A change of rules on the way, as a scenario writes it.
@@ -38,8 +47,8 @@ pub(crate) struct ImportedScenarioSettings {
     pub(super) start: ImportedRules,
     /// Changes on the way, by rising time.
     pub(super) changes: Vec<ImportedChange>,
-    /// The winds that blow, each from its time on: meters per second to the east and to the north.
-    pub(super) winds: Vec<(f64, [f64; 2])>,
+    /// The winds that blow, each from its time on.
+    pub(super) winds: Vec<(f64, ImportedWind)>,
     /// Commands that cannot be flown.
     pub(crate) refused: Vec<InputError>,
     /// Choices that are not in the file.
@@ -149,7 +158,7 @@ fn fill_silent_start(states: &mut [(f64, ImportedRules)]) -> Vec<String> {
             "conflicts are resolved from a time on: without the shield, which keeps separation from the start".into(),
         );
     }
-    if states.iter().any(|(_, rules)| rules.wind_m_s.is_some() && !rules.is_bare) {
+    if states.iter().any(|(_, rules)| rules.wind.is_some() && !rules.is_bare) {
         states.iter_mut().for_each(|(_, rules)| rules.is_bare = true);
         guesses.push(
             "a wind blows: without the shield, whose stored orbits a wind would drive apart or together on the earth"
@@ -166,11 +175,11 @@ fn fill_silent_start(states: &mut [(f64, ImportedRules)]) -> Vec<String> {
 }
 
 /// Returns the winds of all states; none where none blows at any time.
-fn winds_of(states: &[(f64, ImportedRules)]) -> Vec<(f64, [f64; 2])> {
-    if states.iter().all(|(_, rules)| rules.wind_m_s.is_none()) {
+fn winds_of(states: &[(f64, ImportedRules)]) -> Vec<(f64, ImportedWind)> {
+    if states.iter().all(|(_, rules)| rules.wind.is_none()) {
         return Vec::new();
     }
-    states.iter().map(|(at_s, rules)| (*at_s, rules.wind_m_s.unwrap_or_default())).collect()
+    states.iter().map(|(at_s, rules)| (*at_s, rules.wind.clone().unwrap_or_default())).collect()
 }
 
 /// Returns the changes from each state to the next.
@@ -209,8 +218,8 @@ fn change_text(before: &ImportedRules, after: &ImportedRules) -> String {
     if after.vertical_m != before.vertical_m {
         let _ = write!(text, ", vertical_m = {:?}", after.vertical_m);
     }
-    if after.wind_m_s != before.wind_m_s {
-        let _ = write!(text, ", wind_m_s = {:?}", after.wind_m_s.unwrap_or([0.0; 2]));
+    if after.wind != before.wind {
+        let _ = write!(text, ", {}", after.wind.clone().unwrap_or_default().key_text());
     }
     text
 }
@@ -235,6 +244,36 @@ fn changes_of_aircraft(file: &ScnFile) -> Vec<ImportedChange> {
         }
     }
     changes
+}
+
+impl ImportedWind {
+    /// Returns its key with its value, as a scenario writes it.
+    pub(super) fn key_text(&self) -> String {
+        match &self.layers[..] {
+            [] => "wind_m_s = [0.0, 0.0]".to_string(),
+            [(_, wind_m_s)] => format!("wind_m_s = {wind_m_s:?}"),
+            layers => {
+                let layer = |(altitude_m, wind_m_s): &(f64, [f64; 2])| {
+                    format!("{{ altitude_m = {altitude_m:?}, wind_m_s = {wind_m_s:?} }}")
+                };
+                let layers: Vec<String> = layers.iter().map(layer).collect();
+                format!("winds = [{}]", layers.join(", "))
+            }
+        }
+    }
+
+    /// Returns the wind at an altitude, in meters per second.
+    pub(super) fn at_altitude_m_s(&self, altitude_m: f64) -> [f64; 2] {
+        let above = self.layers.partition_point(|(layer_m, _)| *layer_m <= altitude_m);
+        match (above.checked_sub(1).map(|below| self.layers[below]), self.layers.get(above)) {
+            (Some((low_m, low)), Some(&(high_m, high))) => {
+                lerp(low, high, (altitude_m - low_m) / (high_m - low_m))
+            }
+            // Beyond the layers it is as in the last one.
+            (Some((_, wind_m_s)), None) | (None, Some(&(_, wind_m_s))) => wind_m_s,
+            (None, None) => [0.0; 2],
+        }
+    }
 }
 
 impl ImportedRules {
@@ -301,13 +340,14 @@ impl SettingsReader<'_> {
         if look_ahead_s.is_none() && method == Some("mvp") {
             look_ahead_s = Some(MVP_LOOK_AHEAD_S);
         }
-        let wind_m_s = wind_m_s(&self.now.winds, &self.file.traffic.aircraft);
-        let wind_m_s = wind_m_s.unwrap_or_else(|cause| {
+        let wind = imported_wind(&self.now.winds, &self.file.traffic.aircraft);
+        let wind = wind.unwrap_or_else(|cause| {
             let given = self.file.traffic.settings.iter();
             let mut winds = given.filter(|one| matches!(one.setting, Setting::AddedWind(_)));
             let last_s = timed.map_or(f64::INFINITY, |timed| timed.at_s);
             if let Some(last) = winds.rfind(|one| one.at_s <= last_s).cloned() {
-                self.refuse(&last, cause, "give one wind below the speed of all aircraft");
+                let remedy = "give winds in one place, each at an altitude of its own, below the speed of all aircraft";
+                self.refuse(&last, cause, remedy);
             }
             // It is told once.
             self.now.winds.clear();
@@ -318,7 +358,7 @@ impl SettingsReader<'_> {
             is_bare,
             look_ahead_s,
             resolution_factor: self.now.resolution_factor,
-            wind_m_s,
+            wind,
             separation_m: self.now.radius_nm * NAUTICAL_MILE_M,
             vertical_m: self.now.half_height_ft * FOOT_M,
         }
@@ -335,25 +375,46 @@ fn resolution_method(now: &SettingsInForce) -> (Option<&'static str>, bool) {
     }
 }
 
-/// Returns the one wind of a file, if it has any.
+/// Returns the wind of a file, if it has any: one that is the same everywhere, or one for each of some altitudes.
 ///
 /// # Errors
-/// The cause, when winds differ from place to place, or no aircraft could fly against it.
-fn wind_m_s(winds: &[Wind], aircraft: &[ScnAircraft]) -> Result<Option<[f64; 2]>, String> {
+/// The cause, when winds differ from place to place, or some aircraft could not fly against it.
+fn imported_wind(winds: &[Wind], aircraft: &[ScnAircraft]) -> Result<Option<ImportedWind>, String> {
     let Some(first) = winds.first() else { return Ok(None) };
-    let is_uniform = winds
-        .iter()
-        .all(|other: &Wind| other.from_deg == first.from_deg && other.speed_kt == first.speed_kt);
-    if !is_uniform {
-        return Err(format!("{} winds that differ; none blows", winds.len()));
+    let is_like_first =
+        |other: &Wind| other.from_deg == first.from_deg && other.speed_kt == first.speed_kt;
+    let mut layers = Vec::with_capacity(winds.len());
+    if winds.iter().all(is_like_first) {
+        layers.push((0.0, velocity_m_s(first)));
+    } else {
+        for wind in winds {
+            match wind.altitude_ft {
+                Some(altitude_ft) if wind.position == first.position => {
+                    layers.push((altitude_ft * FOOT_M, velocity_m_s(wind)));
+                }
+                _ => return Err(format!("{} winds that differ; none blows", winds.len())),
+            }
+        }
+        layers.sort_by(|(a_m, _), (b_m, _)| a_m.total_cmp(b_m));
+        if let Some(pair) = layers.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            let altitude_m = pair[0].0;
+            return Err(format!("two winds at an altitude of {altitude_m:.0} m; none blows"));
+        }
     }
-    let from_rad = first.from_deg.to_radians();
-    let speed_m_s = first.speed_kt * KNOT_M_S;
+    let speeds_m_s = layers.iter().map(|(_, wind_m_s)| norm(*wind_m_s));
+    let speed_m_s = speeds_m_s.fold(0.0, f64::max);
     if let Some(slow) = aircraft.iter().find(|one| min_speed_m_s(one) <= speed_m_s) {
         return Err(format!("{speed_m_s:.1} m/s, and {} is slower; it does not blow", slow.id));
     }
+    Ok(Some(ImportedWind { layers }))
+}
+
+/// Returns the velocity of a wind to the east and to the north, in meters per second.
+fn velocity_m_s(wind: &Wind) -> [f64; 2] {
+    let from_rad = wind.from_deg.to_radians();
+    let speed_m_s = wind.speed_kt * KNOT_M_S;
     // It blows from there, clockwise from north.
-    Ok(Some([-speed_m_s * math::sin(from_rad), -speed_m_s * math::cos(from_rad)]))
+    [-speed_m_s * math::sin(from_rad), -speed_m_s * math::cos(from_rad)]
 }
 
 /// Returns the smallest speed of an aircraft once it moves.
@@ -399,7 +460,7 @@ mod tests {
         let as_in_bluesky = "look_ahead_s = 300.0, margin = 1.0, resolution_factor = 1.2";
         assert_eq!(settings.start.mvp_text(), as_in_bluesky);
         assert_eq!((start.separation_m, start.vertical_m), (5556.0, 152.4));
-        let [east, north] = start.wind_m_s.expect("a wind");
+        let [east, north] = start.wind.expect("a wind").at_altitude_m_s(900.0);
         assert!((east - 18.52).abs() < 1e-9 && north.abs() < 1e-9, "{east} {north}");
     }
 
@@ -469,7 +530,7 @@ mod tests {
             assert!(one.contains(&format!("{name}: ")), "{one}");
             assert_eq!(settings.refused[0].line_and_column(), Some((line, 1)), "{commands}");
             let start = &settings.start;
-            assert_eq!((start.look_ahead_s, start.wind_m_s), (None, None), "{commands}");
+            assert_eq!((start.look_ahead_s, &start.wind), (None, &None), "{commands}");
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use super::AirspaceWorld;
 use crate::flight::{
-    AirplaneStart, ConstantRateLeg, InterOrderSegment, Pose2, RoutePosition, Surface, distance_m,
+    AirplaneStart, ConstantRateLeg, FlightConditions, InterOrderSegment, Pose2, RoutePosition,
+    Surface, distance_m,
 };
 use crate::measures::FlightEffort;
 use sidestep_kernel::{EntitySlot, interrupt};
@@ -30,6 +31,8 @@ struct SoloFlight<'a> {
     /// Whether it flies on forever after its last order.
     ends_on_heading: bool,
     effort: FlightEffort,
+    /// The air through which it flies in this cycle.
+    air: FlightConditions,
 }
 
 /// The duration and the cost of a solo flight.
@@ -45,10 +48,11 @@ impl SoloFlight<'_> {
         self.steps as f64 * self.world.timing.dtau_s
     }
 
-    /// Executes the orders that are due, at the start of a cycle, as in a run.
-    fn apply_orders(&mut self) {
+    /// Executes the orders that are due, and enters the air that is there, at the start of a cycle, as in a run.
+    fn start_cycle(&mut self) {
         let Self { world, slot, orders, next, .. } = *self;
         if self.steps.is_multiple_of(world.timing.points_per_dt()) {
+            self.air = world.air_at(self.pose.at, self.altitude_m);
             let now_s = self.joins_s + self.elapsed_s();
             (self.orders, self.next) =
                 world.progress_after_orders(slot as usize, orders, next, now_s);
@@ -72,8 +76,7 @@ impl SoloFlight<'_> {
     /// Flies all steps at once in which it certainly flies straight on to its way-point. On the earth that is along the
     /// shortest path, on which a wind would blow from ever other sides.
     fn fly_straight(&mut self) {
-        let world = self.world;
-        let air = world.flight_environment();
+        let Self { world, air, .. } = *self;
         let InterOrderSegment { model, mission, .. } = world.segment(self.slot, self.orders);
         let frame = world.surface.frame_at(self.pose.at);
         let pose = frame.pose_to_local(self.pose);
@@ -91,29 +94,33 @@ impl SoloFlight<'_> {
         self.steps = self.steps.saturating_add(straight);
     }
 
-    /// Adds the cost of a step.
+    /// Changes the level by a step, and adds the cost of that step.
     fn add_step_effort(&mut self, segment: &InterOrderSegment<'_>, pose: Pose2, omega_rad_s: f64) {
-        let world = self.world;
-        let Some(measures) = world.measures.flights else { return };
+        let Self { world, air, .. } = *self;
         let dtau_s = world.timing.dtau_s;
         let altitude_m = segment.altitude_after_m(self.altitude_m, dtau_s);
+        let Some(measures) = world.measures.flights else {
+            self.altitude_m = altitude_m;
+            return;
+        };
         let climb_m_s = (altitude_m - self.altitude_m) / dtau_s;
         let leg = ConstantRateLeg::new(0.0, dtau_s, pose, segment.model.v_m_s, omega_rad_s)
             .with_climb(self.altitude_m, climb_m_s)
-            .in_wind(world.wind_m_s);
+            .in_wind(air.wind_m_s);
         self.effort.add_leg(&leg, measures);
         self.altitude_m = altitude_m;
     }
 
     /// Flies a step, and all those before it in which it certainly flies straight on, at once.
     fn step(&mut self) {
-        let world = self.world;
-        let air = world.flight_environment();
+        let Self { world, air, .. } = *self;
         let segment = world.segment(self.slot, self.orders);
         let InterOrderSegment { model, mission, .. } = segment;
         let has_no_orders =
             self.airplane.orders.is_empty() && self.airplane.leaves_s == f64::INFINITY;
-        let can_skip = has_no_orders && !(world.surface == Surface::Earth && air.has_wind());
+        let is_same_wind = world.wind_field.as_ref().is_none_or(|field| !field.varies_by_place());
+        let can_skip =
+            has_no_orders && is_same_wind && !(world.surface == Surface::Earth && air.has_wind());
         if can_skip {
             self.fly_straight();
         }
@@ -156,10 +163,11 @@ impl AirspaceWorld {
             steps: 0,
             ends_on_heading,
             effort: FlightEffort::default(),
+            air: self.flight_environment(),
         };
         for _ in 0..MAX_COMPUTED_STEPS {
             interrupt::check();
-            flight.apply_orders();
+            flight.start_cycle();
             if let Some(duration_s) = flight.end_s() {
                 return SoloOutcome { duration_s, effort: flight.effort };
             }

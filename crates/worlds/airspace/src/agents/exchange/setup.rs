@@ -2,10 +2,11 @@
 
 use super::Proposal;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::{FlightConditions, FlightLevelRange, TurnLimit};
+use crate::flight::{FlightConditions, FlightLevelRange, TurnLimit, WindField};
 use crate::shield::{CommonPlan, PlanCertainty, ShieldedAircraft, TurnProfile};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
+use std::sync::Arc;
 
 /// Number of cycles after which airplanes take turns: long enough to get out of the others' reach.
 const PRIORITY_PERIOD_CYCLES: Cycle = 12;
@@ -18,6 +19,8 @@ pub struct ObservedAircraft {
     /// Its position, and its model. Of others, the fallback is known only where they are seen to be on it, and
     /// neither rank nor exempt pairs are.
     pub aircraft: ShieldedAircraft,
+    /// The altitude on which it is seen, in meters.
+    pub altitude_m: f64,
     /// Whether it is seen to be on its fallback.
     pub is_on_orbit: bool,
     /// Whether its stored fallback is known to all that see it.
@@ -42,8 +45,10 @@ pub struct ObservedAircraft {
 /// their plans.
 #[derive(Debug, Clone)]
 pub struct ShieldExchangeSetup {
-    /// The air that all fly through.
+    /// The air that all fly through, or that in which they are compared.
     pub air: FlightConditions,
+    /// The wind on each level and in each place, where it differs.
+    pub wind_field: Option<Arc<WindField>>,
     /// Airplanes at least this many meters above each other need not avoid each other.
     pub vertical_m: f64,
     /// The present cycle.
