@@ -255,8 +255,8 @@ impl Interpreter {
             "SYN" => self.synthesize(arguments),
             "ZONER" | "ZONEDH" => self.set_zone(arguments, name),
             "NORESO" | "RESOOFF" => self.toggle_avoidance(arguments, name),
-            "ASAS" | "CDMETHOD" | "RESO" | "DTLOOK" | "NOISE" | "RFACH" | "RMETHH" | "RMETHV"
-            | "PRIORULES" => self.set(arguments, name),
+            "ASAS" | "CDMETHOD" | "RESO" | "DTLOOK" | "NOISE" | "RFACH" | "RFACV" | "RMETHH"
+            | "RMETHV" | "PRIORULES" => self.set(arguments, name),
             "WIND" => self.add_wind(arguments),
             "PCALL" => self.call(arguments),
             "IC" => self.load(arguments),

@@ -219,18 +219,30 @@ fn winds_come_and_go() {
 fn limits_of_resolutions_that_are_not_flown_are_named() {
     let file = scenario(
         "RMETHH HDG;RMETHV OFF;PRIORULES OFF;PRIORULES ON FF1
-        RMETHH BOTH;RMETHV ON;PRIORULES ON FF2;RFACV 1.2;CRE A B744 0 0 0 0 100;DTLOOK 20 A",
+        RMETHH UP;RMETHV DOWN;PRIORULES ON FF2;CRE A B744 0 0 0 0 100;DTLOOK 20 A",
     );
-    let expected = [
-        ("RMETHH BOTH", 1),
-        ("RMETHV ON", 1),
-        ("PRIORULES FF2", 1),
-        ("RFACV", 1),
-        ("DTLOOK aircraft", 1),
-    ];
+    let expected =
+        [("RMETHH UP", 1), ("RMETHV DOWN", 1), ("PRIORULES FF2", 1), ("DTLOOK aircraft", 1)];
     assert_eq!(file.not_understood, counts(&expected));
     assert!(file.unused.iter().all(|one| one.place == "line 2" && !one.reason.is_empty()));
-    assert_eq!(file.unused.len(), 5);
+    assert_eq!(file.unused.len(), 4);
+}
+
+#[test]
+fn limits_of_resolutions_are_settings() {
+    let file =
+        good("RMETHH BOTH;RMETHH SPD;RMETHH HDG;RMETHH OFF;RMETHV V/S;RMETHV NONE;RFACV 1.2");
+    let horizontal = |resolution| (0.0, "RMETHH", Setting::HorizontalResolution(resolution));
+    let expected = [
+        horizontal(HorizontalResolution::Both),
+        horizontal(HorizontalResolution::Speed),
+        horizontal(HorizontalResolution::Heading),
+        horizontal(HorizontalResolution::Off),
+        (0.0, "RMETHV", Setting::VerticalResolution(true)),
+        (0.0, "RMETHV", Setting::VerticalResolution(false)),
+        (0.0, "RFACV", Setting::VerticalResolutionFactor(1.2)),
+    ];
+    assert_eq!(settings(&file), expected);
 }
 
 #[test]
@@ -759,7 +771,7 @@ fn the_shared_scenarios_of_each_kind_are_read_to_the_end() {
     assert!(given.contains(&Setting::Resolution(ResolutionMethod::Mvp)), "{given:?}");
     assert_eq!(file.traffic.aircraft.len(), 8);
     let named: Vec<&str> = file.not_understood.keys().map(String::as_str).collect();
-    assert_eq!(named, ["AREA", "RMETHH BOTH"]);
+    assert_eq!(named, ["AREA"]);
 
     let route = shared_scenario("ASAS__ASAS-06.scn").expect("shared").traffic.aircraft;
     assert_eq!(route.iter().map(|one| one.way_points.len()).collect::<Vec<_>>(), [13, 12]);

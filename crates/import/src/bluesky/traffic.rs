@@ -47,6 +47,12 @@ pub enum Setting {
     Resolution(ResolutionMethod),
     /// The factor on the zone out of which conflicts are resolved (`RFACH`); 1.05 unless given.
     ResolutionFactor(f64),
+    /// What MVP changes in the horizontal (`RMETHH`).
+    HorizontalResolution(HorizontalResolution),
+    /// Whether MVP changes vertical speeds (`RMETHV`).
+    VerticalResolution(bool),
+    /// The factor on the zone's height to which conflicts are resolved in the vertical (`RFACV`); 1.01 unless given.
+    VerticalResolutionFactor(f64),
     /// A further wind at a place (`WIND`).
     AddedWind(Wind),
     /// The end of all winds (`DEL WIND`).
@@ -77,6 +83,19 @@ pub enum ResolutionMethod {
     Ssd,
     /// The method after Eby.
     Eby,
+}
+
+/// What MVP changes in the horizontal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HorizontalResolution {
+    /// Headings and speeds.
+    Both,
+    /// Speeds.
+    Speed,
+    /// Headings.
+    Heading,
+    /// No limit in the horizontal: without one in the vertical everything, else vertical speeds.
+    Off,
 }
 
 /// The wind at a place.

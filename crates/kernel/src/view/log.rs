@@ -151,6 +151,8 @@ log_event_kinds! {
     AreaEntry = "area-entry",
     /// The shield does not keep a body clear of an area; the value is the number of the area.
     AreaExempt = "area-exempt",
+    /// The shield has not cleared a level or a speed that a method commands.
+    CommandHeld = "command-held",
 }
 
 /// The severity of an event, rising.

@@ -1,8 +1,8 @@
 //! *Act*: the airplanes of a group decide together and fly for `dt`.
 //!
 //! ```text
-//! prepare          airplanes enter, orders are executed, and      entry.rs, orders.rs,
-//!                  changes of level are cleared                   levels.rs
+//! prepare          airplanes enter, orders and commands are       entry.rs, orders.rs,
+//!                  executed, and changes of level are cleared     commands.rs, levels.rs
 //! Percept          what each perceives                            join.rs
 //!   -> Control     the decision for each: by one process for all (direct.rs), their pilots (deploy/),
 //!                  or pilots outside of the run (fleet.rs)
@@ -12,6 +12,9 @@
 
 mod approaches;
 mod areas;
+#[cfg(test)]
+mod command_tests;
+mod commands;
 mod controls;
 mod direct;
 mod entry;
@@ -104,7 +107,9 @@ pub(super) fn prepare_decisions(
         areas::report_exempt_areas(context, &flown.ids);
         errors::report_beyond_bound(context, &flown.ids);
     }
+    commands::hold_speeds(context, group);
     orders::execute_due_orders(context, group, &flown.ids);
+    commands::carry_out(context, group, &flown.ids);
     levels::clear_levels(context, group, &flown.ids);
     flown
 }

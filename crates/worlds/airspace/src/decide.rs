@@ -12,9 +12,9 @@ mod velocity;
 
 use super::agents::network_traffic::NetworkTraffic;
 use super::agents::{ActionChoice, ReachedCost};
-use super::baseline::mvp::ActiveResolutions;
+use super::baseline::ReactiveMemory;
 use super::external_action::ExternalAction;
-use super::flight::{Action, KnownAircraft};
+use super::flight::{Action, KnownAircraft, MethodCommand};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionPredictions, build_group_game, own_costs};
@@ -96,12 +96,16 @@ pub(super) struct ManeuverCandidates {
     pub(super) profiles: Vec<TurnProfile>,
     /// The optimizer's decision.
     pub(super) decided: Option<ActionChoice>,
+    /// The level and the speed that the method commands from the next cycle on.
+    pub(super) command: MethodCommand,
 }
 
 impl ManeuverCandidates {
     fn from_actions(world: &AirspaceWorld, known: KnownAircraft, actions: Vec<Action>) -> Self {
+        let first = actions.first().copied().unwrap_or(Action::OPTIMAL);
         Self {
             profiles: preferences::turn_profiles_from_actions(world, known, &actions),
+            command: world.action_command(known, first),
             actions,
             decided: None,
         }
@@ -197,25 +201,30 @@ pub(super) fn candidates_from_choice(
 }
 
 /// Returns the candidates of the airplanes of a group by the world's method, if that gives them
-/// headings. `memory` are the conflicts that they resolve.
+/// headings. `memory` is what it keeps of each.
 pub(super) fn candidates_by_velocity(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
     non_cooperative: &[NonCooperativeAircraft],
-    memory: &mut [ActiveResolutions],
+    memory: &mut [ReactiveMemory],
     now: Cycle,
 ) -> Vec<ManeuverCandidates> {
     let profiles = velocity::profiles_by_velocity(world, group, non_cooperative, memory, now);
-    profiles.into_iter().map(ManeuverCandidates::from_profiles).collect()
+    let each = profiles.into_iter().zip(memory);
+    each.map(|(profiles, memory)| ManeuverCandidates {
+        command: memory.command,
+        ..ManeuverCandidates::from_profiles(profiles)
+    })
+    .collect()
 }
 
-/// Returns the candidates of the airplanes of a group by the world's method, each with the knowledge of all. `memory` are
-/// the conflicts that they resolve.
+/// Returns the candidates of the airplanes of a group by the world's method, each with the knowledge of all. `memory` is
+/// what it keeps of each.
 pub(super) fn candidates_for_group(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
     non_cooperative: &[NonCooperativeAircraft],
-    memory: &mut [ActiveResolutions],
+    memory: &mut [ReactiveMemory],
     now: Cycle,
 ) -> Vec<ManeuverCandidates> {
     match DecisionStrategy::for_group(world, group, non_cooperative.len()) {

@@ -40,6 +40,8 @@ pub enum EventKind {
     /// The shield does not keep an airplane clear of an area, because it has no fallback that is clear of it; the value
     /// is the number of the area.
     AreaExempt,
+    /// The shield has not cleared what a method commands: the airplane keeps its speed, or levels off short of a level.
+    CommandHeld,
 }
 
 /// The quantity that the value of an event measures: each has a column of its own in the table.
@@ -75,12 +77,17 @@ impl EventKind {
             | Self::BeyondBound
             | Self::AreaEntry
             | Self::AreaExempt => Some(EventQuantity::Number),
-            Self::Orbit | Self::Unheard | Self::Deadline | Self::HeldBack | Self::Absent => None,
+            Self::Orbit
+            | Self::Unheard
+            | Self::Deadline
+            | Self::HeldBack
+            | Self::Absent
+            | Self::CommandHeld => None,
         }
     }
 
     /// All kinds; the table of events stores places in this list.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::LossOfSeparation,
         Self::Arrival,
         Self::Override,
@@ -94,6 +101,7 @@ impl EventKind {
         Self::Absent,
         Self::AreaEntry,
         Self::AreaExempt,
+        Self::CommandHeld,
     ];
 
     /// Returns the kind that it is for viewers, which know no world.
@@ -112,6 +120,7 @@ impl EventKind {
             Self::Absent => LogEventKind::Absent,
             Self::AreaEntry => LogEventKind::AreaEntry,
             Self::AreaExempt => LogEventKind::AreaExempt,
+            Self::CommandHeld => LogEventKind::CommandHeld,
         }
     }
 
@@ -131,6 +140,7 @@ impl EventKind {
             Self::Absent => "absent",
             Self::AreaEntry => "area-entry",
             Self::AreaExempt => "area-exempt",
+            Self::CommandHeld => "command-held",
         }
     }
 }

@@ -185,7 +185,7 @@ impl AirspaceWorld {
             let found = omegas_rad_s.len();
             return Err(format!("it has {found} turn rates; give {steps}, one for each step"));
         }
-        let max_rad_s = self.segment(own.id, own.orders).model.omega_max_rad_s;
+        let max_rad_s = self.flown_segment(own.id, own.orders, &own.command).model.omega_max_rad_s;
         // NaN is in no range.
         let range = -max_rad_s..=max_rad_s;
         if let Some(omega) = omegas_rad_s.iter().find(|omega| !range.contains(omega)) {

@@ -70,6 +70,7 @@ fn airplane(params: &GeneratorParams<'_>, from: Point, to: Vec<Point>) -> Airpla
         is_non_cooperative: false,
         priority: 0,
         changes: params.changes.clone(),
+        commanded_speeds_m_s: None,
     }
 }
 

@@ -6,6 +6,7 @@ use super::perceive::{claim, ownship_state, surveillance_report};
 use super::pilot::{Percept, SurveillanceReport};
 use super::scratch::PhaseContext;
 use super::settings::Grouping;
+use super::state::AirplaneCommand;
 use sidestep_kernel::EntitySlot;
 use sidestep_kernel::conflict::ConflictGroups;
 use std::ops::Range;
@@ -144,6 +145,14 @@ fn levels(context: &PhaseContext<'_>, slot: EntitySlot) -> FlightLevelRange {
         current.altitude_m.get(),
         world.segment(slot, done.into()).altitude_m,
     );
+    if state.has_commands() {
+        // Commands are carried out in this cycle, or given back.
+        let airplane = &world.airplanes[slot as usize];
+        let AirplaneCommand { wish, in_force } = state.command(slot);
+        for level in [airplane.limited_command(wish).level, in_force.level].into_iter().flatten() {
+            levels = levels.extended_by_level(level.altitude_m);
+        }
+    }
     let orders = &world.airplanes[slot as usize].orders;
     let now_s = world.cycle_start_s(*now);
     let due = orders.iter().skip(done.into()).take_while(|order| order.at_s <= now_s);

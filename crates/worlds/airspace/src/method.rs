@@ -1,11 +1,11 @@
 //! Methods by which airplanes choose where to fly: the built-in ones, and those of a program's own.
 //!
-//! A method of your own gives each airplane a heading or a turn rate, from what that airplane perceives. It is asked
-//! once per step of `dtau`, as ORCA, MVP and track bands are; the airplane turns as fast as it can, and the shield, where it is on,
+//! A method of your own gives each airplane a heading or a turn rate, from what that airplane perceives, and if it wants a
+//! level and a speed. It is asked once per step of `dtau`, as ORCA, MVP and track bands are; the airplane turns as fast as it can, and the shield, where it is on,
 //! filters the result as it does that of any method.
 
 use crate::baseline::AircraftState;
-use crate::flight::Point;
+use crate::flight::{CommandKinds, MethodCommand, Point, SpeedFactors};
 use crate::settings::BuiltInMethod;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::stream::Draws;
@@ -23,6 +23,19 @@ pub trait Method: Debug + Send + Sync {
     /// random stream of this cycle, because groups decide in any order; and because, with agents, each airplane of a
     /// group computes the same for all of it. What it has to know of the past it reads from headings and velocities.
     fn decide(&self, percept: &MethodPercept<'_>, draws: &mut Draws) -> Steering;
+
+    /// Returns what it commands beside where to turn; nothing unless given. It must always be the same.
+    fn command_kinds(&self) -> CommandKinds {
+        CommandKinds::NONE
+    }
+
+    /// Returns the level and the speed that an airplane is to have; called after `decide` if
+    /// [`Self::command_kinds`] has any. The last command of a cycle counts: from the next cycle on it overlays
+    /// the filed flight, within what the airplane can fly and, with the shield, as far as that clears it. What is none is
+    /// flown as filed. The percept has what is in force.
+    fn command(&self, _: &MethodPercept<'_>, _: &mut Draws) -> MethodCommand {
+        MethodCommand::NONE
+    }
 }
 
 /// What an airplane perceives in one step of `dtau`. Positions are those that all see, with the errors of the scenario.
@@ -40,9 +53,15 @@ pub struct MethodPercept<'a> {
     pub way_point_m: Point,
     /// Its greatest turn rate, in radians per second.
     pub omega_max_rad_s: f64,
+    /// The altitude of its filed level, in meters.
+    pub filed_altitude_m: f64,
+    /// Its filed airspeed, in meters per second.
+    pub filed_v_m_s: f64,
+    /// The command that is in force.
+    pub command: MethodCommand,
     /// The wind around the airplane, in meters per second; velocities of airplanes are relative to that air.
     pub wind_m_s: Point,
-    /// The others of its group on its levels, by rising id, and then those that avoid nobody. All that it could come
+    /// The others of its group on its levels (on all levels, if the method commands levels), by rising id, and then those that avoid nobody. All that it could come
     /// too near to within `airspace.horizon_s` are among them.
     pub others: &'a [AircraftState],
 }
@@ -123,6 +142,46 @@ impl OwnMethod {
             percept.own.slot
         );
         steering
+    }
+
+    /// Returns what the method commands beside where to turn.
+    ///
+    /// # Panics
+    /// When that consists of no numbers with which an airplane could be flown.
+    pub(crate) fn command_kinds(&self) -> CommandKinds {
+        let kinds = self.method.command_kinds();
+        let Self { name, .. } = self;
+        let are_factors = |speeds: SpeedFactors| {
+            speeds.least > 0.0
+                && speeds.least <= 1.0
+                && speeds.largest >= 1.0
+                && speeds.largest.is_finite()
+        };
+        assert!(
+            kinds.speeds.is_none_or(are_factors),
+            "method `{name}` commands {kinds:?}; give factors above 0, up to 1 and from 1 on"
+        );
+        kinds
+    }
+
+    /// Returns the level and the speed that the method commands of an airplane: only what it says that it commands.
+    ///
+    /// # Panics
+    /// When these are no numbers: an airplane would have no position any more.
+    pub(crate) fn command(&self, percept: &MethodPercept<'_>, draws: &mut Draws) -> MethodCommand {
+        let kinds = self.method.command_kinds();
+        if kinds.is_none() {
+            return MethodCommand::NONE;
+        }
+        let MethodCommand { level, v_m_s } = self.method.command(percept, draws);
+        let command = MethodCommand {
+            level: level.filter(|_| kinds.levels),
+            v_m_s: v_m_s.filter(|_| kinds.speeds.is_some()),
+        };
+        let Self { name, .. } = self;
+        let slot = percept.own.slot;
+        assert!(command.is_valid(), "method `{name}` commanded of airplane {slot} {command:?}");
+        command
     }
 }
 

@@ -216,6 +216,9 @@ metrics! {
         pub shield_orbits: u64 => "times on the stored fallback",
         /// Wishes changed because not all others had agreed in time.
         pub shield_held_back: u64 => "wishes held back for lack of agreement",
+        /// Times that the shield did not clear a level or a speed that a method commands: the airplane kept its speed for one
+        /// `dt`, or leveled off short of a level; none where methods command neither.
+        pub commands_held: Option<u64> => "levels and speeds held by the shield",
         /// Times that an airplane lost contact with another one.
         pub contacts_lost: u64 => "contacts lost",
         /// Times that an agent ran out of time.
@@ -597,6 +600,7 @@ pub(crate) fn metrics(
         shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
         shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
         shield_held_back: counters.event_count(EventKind::HeldBack),
+        commands_held: world.has_commands().then(|| counters.event_count(EventKind::CommandHeld)),
         contacts_lost: counters.event_count(EventKind::Unheard),
         deadlines_missed: counters.event_count(EventKind::Deadline),
         groups_too_large: counters.event_count(EventKind::GroupTooLarge),

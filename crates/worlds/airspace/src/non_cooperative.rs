@@ -31,6 +31,10 @@ pub struct NonCooperativeAircraft {
     pub(crate) separation_m: f64,
     /// Bound in meters on how far it may be from where it is seen.
     pub(crate) error_m: f64,
+    /// Altitude in meters.
+    pub(crate) altitude_m: f64,
+    /// Its rate of climb in meters per second, negative downward.
+    pub(crate) climb_m_s: f64,
     /// The levels that it can be on within `dt`.
     pub(crate) levels: FlightLevelRange,
     /// Seconds of a `dt`.
@@ -56,10 +60,12 @@ impl NonCooperativeAircraft {
     /// Returns whether its numbers can be computed with.
     pub(crate) fn is_valid(&self) -> bool {
         let Self { velocity_m_s, top_m_s, separation_m, error_m, levels, dt_s, .. } = *self;
+        let Self { altitude_m, climb_m_s, .. } = *self;
         let [x_m, y_m] = self.at;
         let [vx, vy] = velocity_m_s;
-        are_bounded_by([x_m, y_m, separation_m, error_m], MAX_COORDINATE_M)
+        are_bounded_by([x_m, y_m, separation_m, error_m, altitude_m], MAX_COORDINATE_M)
             && are_bounded_by([vx, vy, top_m_s], MAX_GROUND_SPEED_M_S)
+            && climb_m_s.is_finite()
             && are_bounded_by([dt_s], MAX_DT_S)
             && [top_m_s, separation_m, error_m, dt_s].iter().all(|size| *size >= 0.0)
             // Those of a recorded airplane are infinite.

@@ -56,6 +56,7 @@ pub(super) fn known_aircraft(
         next: current.next.get() as usize,
         orders: current.orders.get().into(),
         altitude_m: current.altitude_m.get(),
+        command: state.command_in_force(slot),
     }
 }
 
@@ -77,6 +78,7 @@ pub(super) fn ownship_state(context: &PhaseContext<'_>, slot: EntitySlot) -> Own
             .levels_within(current.altitude_m.get(), world.timing.dt_s),
         next: current.next.get(),
         orders: current.orders.get().into(),
+        command: state.command_in_force(slot),
         fallback: current.fallback.get(),
         refusals: current.overrides.get(),
         exempt: state.exempt_ids(slot).to_vec(),
@@ -123,14 +125,17 @@ fn non_cooperative_at(context: &PhaseContext<'_>, slot: EntitySlot) -> NonCooper
     let along = |speed: f64| [speed * math::cos(heading_rad), speed * math::sin(heading_rad)];
     let dt_s = world.timing.dt_s;
     let altitude_m = current.altitude_m.get();
-    let (velocity_m_s, top_m_s, levels) = match &airplane.track {
+    let (velocity_m_s, top_m_s, climb_m_s, levels) = match &airplane.track {
         // Recorded speeds are over the ground.
         Some(track) if world.is_replayed(slot, now) => {
             let [vx, vy] = along(track.speed_m_s(world.cycle_start_s(now)));
             let top_m_s = world.top_m_s[slot as usize] + math::hypot(wx, wy);
             let climb_m = track.max_climb_m_s() * dt_s;
             let levels = FlightLevelRange::between(altitude_m - climb_m, altitude_m + climb_m);
-            ([vx - wx, vy - wy], top_m_s, levels)
+            // Until its next decision, as its heading and its speed.
+            let now_s = world.cycle_start_s(now);
+            let climb_m_s = (track.altitude_at_m(now_s + dt_s) - track.altitude_at_m(now_s)) / dt_s;
+            ([vx - wx, vy - wy], top_m_s, climb_m_s, levels)
         }
         // Its motion is that in the common air, which its own air may drift through.
         _ => {
@@ -139,11 +144,12 @@ fn non_cooperative_at(context: &PhaseContext<'_>, slot: EntitySlot) -> NonCooper
             let levels = segment.levels_within(altitude_m, look_ahead_s);
             let air_m_s = along(segment.model.v_m_s);
             let top_m_s = world.top_m_s[slot as usize];
+            let climb_m_s = segment.signed_climb_m_s(altitude_m);
             let drift_m_s = world.air_at(current.pose().at, altitude_m).drift_m_s();
             if drift_m_s == [0.0; 2] {
-                (air_m_s, top_m_s, levels)
+                (air_m_s, top_m_s, climb_m_s, levels)
             } else {
-                (add(air_m_s, drift_m_s), top_m_s + norm(drift_m_s), levels)
+                (add(air_m_s, drift_m_s), top_m_s + norm(drift_m_s), climb_m_s, levels)
             }
         }
     };
@@ -154,6 +160,8 @@ fn non_cooperative_at(context: &PhaseContext<'_>, slot: EntitySlot) -> NonCooper
         top_m_s,
         separation_m: segment.model.separation_m,
         error_m: world.bounds.position_m,
+        altitude_m,
+        climb_m_s,
         levels,
         dt_s,
     }

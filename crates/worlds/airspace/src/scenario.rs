@@ -322,6 +322,7 @@ impl CompiledAirspace {
             resolving: Vec::new(),
             exempt: self.too_close.clone(),
             orbit_poses: Vec::new(),
+            commands: Vec::new(),
             external_actions: Vec::new(),
             controls: None,
             efforts: Vec::new(),

@@ -97,6 +97,51 @@ pub struct ReactiveSettings {
     pub resolution_factor: f64,
 }
 
+/// The parts of its flight that an airplane changes to resolve a conflict by MVP.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Resolution {
+    /// The heading (RMETHH HDG of BlueSky).
+    #[default]
+    Heading,
+    /// The speed (RMETHH SPD).
+    Speed,
+    /// Heading and speed (RMETHH BOTH).
+    HeadingSpeed,
+    /// The vertical speed (RMETHV V/S).
+    Vertical,
+    /// All of these (RMETHH OFF and RMETHV OFF).
+    HeadingSpeedVertical,
+}
+
+impl Resolution {
+    /// Returns its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Heading => "heading",
+            Self::Speed => "speed",
+            Self::HeadingSpeed => "heading-speed",
+            Self::Vertical => "vertical",
+            Self::HeadingSpeedVertical => "heading-speed-vertical",
+        }
+    }
+
+    /// Returns whether it changes headings; else an airplane keeps the one that it has.
+    pub(crate) fn changes_heading(self) -> bool {
+        matches!(self, Self::Heading | Self::HeadingSpeed | Self::HeadingSpeedVertical)
+    }
+
+    /// Returns whether it changes speeds.
+    pub(crate) fn changes_speed(self) -> bool {
+        matches!(self, Self::Speed | Self::HeadingSpeed | Self::HeadingSpeedVertical)
+    }
+
+    /// Returns whether it changes levels.
+    pub(crate) fn changes_level(self) -> bool {
+        matches!(self, Self::Vertical | Self::HeadingSpeedVertical)
+    }
+}
+
 /// A deployment of the optimizer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

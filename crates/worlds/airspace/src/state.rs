@@ -1,5 +1,6 @@
 //! The state of a run, and its snapshot.
 
+mod command;
 mod end;
 mod neighborhood;
 mod snapshot;
@@ -13,6 +14,7 @@ use super::method::MethodKind;
 use super::pilot::{AirplaneControl, PilotMemory};
 use super::shield::{ExemptIds, Fallback};
 use super::world::AirspaceWorld;
+pub use command::AirplaneCommand;
 pub use end::{FlightEnd, PackedFlightEnd};
 use neighborhood::SpatialIndex;
 use sidestep_kernel::column::AtomicCell;
@@ -43,6 +45,8 @@ pub struct AirspaceState {
     /// The altitude in meters to which each airplane may change its level in this cycle. It is found anew in each cycle,
     /// and so no part of a snapshot.
     cleared_m: Box<[AtomicCell<f64>]>,
+    /// What the method commands of each airplane; empty unless a method commands levels or speeds.
+    commands: Box<[Mutex<AirplaneCommand>]>,
     /// The action that a caller has ordered for each airplane; empty unless callers decide.
     external_actions: Box<[Mutex<Option<ExternalAction>>]>,
     /// The cycle for which controls were submitted, or [`NEVER`].
@@ -222,6 +226,7 @@ impl AirspaceState {
         let with_external_actions =
             if matches!(world.method, MethodKind::External) { n } else { 0 };
         let with_efforts = if world.measures.flights.is_some() { n } else { 0 };
+        let with_commands = if world.has_commands() { n } else { 0 };
         let controls_cycle = AtomicCell::default();
         controls_cycle.set(NEVER);
         let state = Self {
@@ -243,6 +248,7 @@ impl AirspaceState {
                 .iter()
                 .map(|record| AtomicCell::new(record.turn_rate_rad_s))
                 .collect(),
+            commands: restore_memories(with_commands, &snapshot.commands),
             external_actions: restore_memories(with_external_actions, &snapshot.external_actions),
             controls_cycle,
             controls: Mutex::default(),
@@ -306,17 +312,25 @@ impl AirspaceState {
     /// Takes out the memories of the airplanes of a group.
     pub(super) fn take_memories(&self, group: &[EntitySlot]) -> Vec<PilotMemory> {
         let both = take(&self.contacts, group).into_iter().zip(take(&self.resolving, group));
-        both.map(|(contacts, resolving)| PilotMemory { contacts, resolving }).collect()
+        let each = both.zip(group);
+        each.map(|((contacts, resolving), &slot)| PilotMemory {
+            contacts,
+            resolving,
+            command: self.command(slot).wish,
+        })
+        .collect()
     }
 
     /// Puts back the memory of an airplane.
     pub(super) fn put_memory(
         &self,
         slot: EntitySlot,
-        PilotMemory { contacts, resolving }: PilotMemory,
+        PilotMemory { contacts, resolving, command }: PilotMemory,
     ) {
         put_memories(&self.contacts, &[slot], vec![contacts]);
         put_memories(&self.resolving, &[slot], vec![resolving]);
+        let in_force = self.command_in_force(slot);
+        self.set_command(slot, AirplaneCommand { wish: command, in_force });
     }
 
     /// Returns the knowledge that an airplane has of others.
@@ -397,6 +411,7 @@ impl AirspaceState {
             resolving: self.resolving.iter().map(|one| lock(one).clone()).collect(),
             exempt,
             orbit_poses: orbits.map(|slot| self.orbit_pose(slot)).collect(),
+            commands: self.commands.iter().map(|one| *lock(one)).collect(),
             external_actions: self.external_actions.iter().map(|one| lock(one).clone()).collect(),
             controls,
             efforts: self.efforts.iter().map(|one| *lock(one)).collect(),
@@ -415,7 +430,8 @@ impl AirspaceState {
         world: &'a AirspaceWorld,
         slot: EntitySlot,
     ) -> InterOrderSegment<'a> {
-        world.segment(slot, self.airplanes[slot as usize].orders.get().into())
+        let orders = self.airplanes[slot as usize].orders.get().into();
+        world.flown_segment(slot, orders, &self.command_in_force(slot))
     }
 
     /// Returns the same, with the altitude to which it may change its level in this cycle.

@@ -251,6 +251,9 @@ pub(super) fn to_log_event(event: &Event) -> LogEvent {
         EventKind::AreaExempt => {
             (Severity::Warning, format!("is not kept clear of area/{value} by the shield"))
         }
+        EventKind::CommandHeld => {
+            (Severity::Info, "is kept by the shield from a level or a speed that it wanted".into())
+        }
     };
     let airplane = |id| BodyId::new(kinds::AIRPLANE, id, None);
     LogEvent {

@@ -5,16 +5,19 @@ mod solo_flight;
 mod tests;
 
 use super::areas::{AreaContext, Areas, LocalAreas};
+use super::baseline::mvp::{MvpRules, ResolutionSettings};
 use super::flight::{
-    Action, AirplaneStart, Chart, DetourAlternatives, DoneOrders, FlightConditions,
-    FlightLevelRange, FlightPhase, Gusts, InterOrderSegment, KnownAircraft, Point, Pose2,
-    RoutePosition, SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, WindField,
+    Action, AirplaneStart, ChangeableFlight, Chart, CommandKinds, DetourAlternatives, DoneOrders,
+    FlightChange, FlightConditions, FlightLevelRange, FlightPhase, Gusts, InterOrderSegment, KnownAircraft,
+    MethodCommand, Point, Pose2, RoutePosition, SegmentAfterOrder, Surface, TimeDiscretization, Track,
+    WaypointRule, WindField,
     actions, actions_at_turn_rate, segments_after_orders,
 };
 use super::measures::{FlightEffort, MeasureSettings};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
-use super::objective::{ActionPredictions, Objective};
+use super::flight_plan::CLIMB_M_S;
+use super::objective::{ActionChanges, ActionPredictions, Objective};
 use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings, RightOfWayRule};
 use super::shield::{
     AirDrift, ErrorBounds, Fallback, OrbitSide, common_orbit_rates, curvature_error_m,
@@ -52,6 +55,10 @@ pub struct AirspaceWorld {
     pub method: MethodKind,
     /// Settings of MVP; without effect on other methods.
     pub mvp: ReactiveSettings,
+    /// The kinds of changes among which methods `pc` and `external` may choose for some airplane.
+    pub changes: CommandKinds,
+    /// How MVP resolves conflicts; without effect on other methods.
+    pub mvp_resolution: ResolutionSettings,
     /// Settings of ORCA; without effect on other methods.
     pub orca: ReactiveSettings,
     /// Settings of track bands; without effect on other methods.
@@ -403,6 +410,21 @@ impl AirspaceWorld {
         self.all_rules().any(|world| matches!(world.method, MethodKind::Mvp))
     }
 
+    /// Returns what the method may command beside where to turn.
+    pub(crate) fn command_kinds(&self) -> CommandKinds {
+        match &self.method {
+            MethodKind::Mvp => self.mvp_resolution.command_kinds(),
+            MethodKind::Own(own) => own.command_kinds(),
+            MethodKind::Pc | MethodKind::External => self.changes,
+            MethodKind::Orca | MethodKind::Bands | MethodKind::None => CommandKinds::NONE,
+        }
+    }
+
+    /// Returns whether a method commands levels or speeds under some of the rules.
+    pub(crate) fn has_commands(&self) -> bool {
+        self.all_rules().any(|world| !world.command_kinds().is_none())
+    }
+
     /// Returns when a cycle starts, in seconds after the start of the run.
     pub fn cycle_start_s(&self, now: Cycle) -> f64 {
         now as f64 * self.timing.dt_s
@@ -508,6 +530,15 @@ impl AirspaceWorld {
         }
     }
 
+    /// Returns the rules by which MVP resolves conflicts.
+    pub(crate) fn mvp_rules(&self) -> MvpRules {
+        MvpRules {
+            settings: self.mvp,
+            resolution: self.mvp_resolution,
+            vertical_m: self.vertical_m,
+        }
+    }
+
     /// Returns the stage of an airplane that has carried out this number of orders.
     pub(crate) fn segment(&self, slot: EntitySlot, orders: u32) -> InterOrderSegment<'_> {
         match self.later[slot as usize].get((orders as usize).wrapping_sub(1)) {
@@ -516,7 +547,7 @@ impl AirspaceWorld {
                 let AirplaneStart { model, mission, altitude_m, .. } =
                     &self.airplanes[slot as usize];
                 InterOrderSegment {
-                    model,
+                    model: Cow::Borrowed(model),
                     mission,
                     altitude_m: *altitude_m,
                     climb_m_s: 0.0,
@@ -524,6 +555,26 @@ impl AirspaceWorld {
                 }
             }
         }
+    }
+
+    /// Returns the same with the command of a method that is in force over it.
+    pub(crate) fn flown_segment(
+        &self,
+        slot: EntitySlot,
+        orders: u32,
+        command: &MethodCommand,
+    ) -> InterOrderSegment<'_> {
+        let filed = self.segment(slot, orders);
+        // In most scenarios no method commands anything.
+        if command.is_none() {
+            return filed;
+        }
+        filed.with_command(command, &self.airplanes[slot as usize].performance)
+    }
+
+    /// Returns the stage of an airplane as its group knows it.
+    pub(crate) fn known_segment(&self, known: KnownAircraft) -> InterOrderSegment<'_> {
+        self.flown_segment(known.slot, known.orders, &known.command)
     }
 
     /// Returns the orders and way-points done with after those that are due at a time, if none
@@ -551,7 +602,7 @@ impl AirspaceWorld {
 
     /// Returns the actions of an airplane at the speed that it has: as many, in the same order.
     pub(crate) fn present_actions(&self, known: KnownAircraft) -> Cow<'_, [Action]> {
-        let present = self.segment(known.slot, known.orders).model;
+        let present = self.known_segment(known).model;
         let start = &self.airplanes[known.slot as usize].model;
         actions_at_turn_rate(self.actions(known.slot), start, present.omega_max_rad_s)
     }
@@ -559,7 +610,7 @@ impl AirspaceWorld {
     /// Returns the levels that an airplane is on, or passes as far as the method looks ahead.
     pub(crate) fn levels(&self, known: KnownAircraft) -> FlightLevelRange {
         let look_ahead_s = self.reactive_settings().look_ahead_s;
-        self.segment(known.slot, known.orders).levels_within(known.altitude_m, look_ahead_s)
+        self.known_segment(known).levels_within(known.altitude_m, look_ahead_s)
     }
 
     /// Returns what is the same for all areas around airplanes in a cycle, for methods that look so far ahead: in the air
@@ -608,14 +659,53 @@ impl AirspaceWorld {
         non_cooperative: &[NonCooperativeAircraft],
         now: Cycle,
     ) -> ActionPredictions {
-        let InterOrderSegment { model, mission, .. } = self.segment(known.slot, known.orders);
+        let InterOrderSegment { model, mission, .. } = self.known_segment(known);
         let actions = self.present_actions(known);
         let route = RoutePosition { mission, next: known.next, pose: known.pose };
-        let predictions = self.air_around(known).predictions(model, &actions, route, None);
+        let flight = self.changeable_flight(known);
+        let predictions =
+            self.air_around(known).predictions(&model, &actions, route, flight.as_ref());
         let frame = self.surface.frame_at(known.pose.at);
-        ActionPredictions::new(predictions, frame, model.separation_m, self.levels(known))
+        let mut options =
+            ActionPredictions::new(predictions, frame, model.separation_m, self.levels(known));
+        if let Some(flight) = flight {
+            options = options.with_changes(ActionChanges {
+                altitudes: actions.iter().map(|action| flight.altitudes(action.change)).collect(),
+                speeds: actions.iter().map(|action| flight.speeds(action.change)).collect(),
+                dtau_s: self.timing.dtau_s,
+                horizon_s: self.timing.horizon_s(),
+            });
+        }
+        options
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)
             .with_areas(&self.prediction_areas(now), &self.objective, self.timing.dtau_s)
+    }
+
+    /// Returns what an airplane flies and would fly by its filed flight; `None` if it has no changes to choose from.
+    fn changeable_flight(&self, known: KnownAircraft) -> Option<ChangeableFlight<'_>> {
+        let airplane = &self.airplanes[known.slot as usize];
+        if airplane.changes.is_empty() {
+            return None;
+        }
+        let filed = self.segment(known.slot, known.orders);
+        let performance = &airplane.performance;
+        Some(ChangeableFlight {
+            altitude_m: known.altitude_m,
+            filed_altitude_m: filed.altitude_m,
+            climb_m_s: CLIMB_M_S.min(performance.climb_max_m_s),
+            filed_climb_m_s: filed.climb_m_s,
+            descent_m_s: CLIMB_M_S.min(performance.descent_max_m_s),
+            filed_descent_m_s: filed.descent_m_s,
+            v_m_s: self.known_segment(known).model.v_m_s,
+            filed_v_m_s: filed.model.v_m_s,
+            performance,
+        })
+    }
+
+    /// Returns the command that an action of an airplane is.
+    pub(crate) fn action_command(&self, known: KnownAircraft, action: Action) -> MethodCommand {
+        let flight = self.changeable_flight(known).filter(|_| action.change != FlightChange::NONE);
+        flight.map_or(MethodCommand::NONE, |flight| flight.command(action.change))
     }
 
     /// Returns the largest number of samples that one optimization may draw from an airplane's

@@ -60,8 +60,17 @@ fn resolves(file: &ScnFile) -> bool {
     file.traffic.settings.iter().any(|timed| is_known(timed.setting))
 }
 
+/// Returns a scenario in which MVP changes headings alone, as BlueSky was made to fly the files.
+fn by_headings_alone(text: &str) -> String {
+    let mut text = text.replace("\"vertical\"", "\"heading\", resolution_factor = 1.01");
+    for resolution in ["\"speed\"", "\"heading-speed\"", "\"heading-speed-vertical\""] {
+        text = text.replace(&format!("resolution = {resolution}"), "resolution = \"heading\"");
+    }
+    text
+}
+
 fn fly(name: &str, file: &ScnFile) -> Option<OwnFlight> {
-    let text = from_bluesky(name, file)?;
+    let text = by_headings_alone(&from_bluesky(name, file)?);
     let mut overrides = vec!["airspace.shield=\"off\""];
     if !resolves(file) {
         overrides.push("airspace.method=\"none\"");

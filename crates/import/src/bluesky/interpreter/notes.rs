@@ -30,7 +30,7 @@ impl Interpreter {
     /// Names the differences that are known once the whole file is read.
     pub(super) fn note_differences(&mut self) {
         if let Some(place) = self.mvp_place.take().filter(|_| !self.has_resolution_limits) {
-            let remedy = "write RMETHH HDG to compare both";
+            let remedy = "write RMETHH BOTH for that, or RMETHH HDG";
             self.note_at(place, Treatment::Guessed, MVP_RULE, remedy);
         }
         let mut turns = Vec::new();

@@ -180,7 +180,7 @@ pub(super) fn reason_without_effect(name: &str) -> &'static str {
             "airplanes here have no type, and turn at 25 degrees of bank"
         }
         "GROUP" | "UNGROUP" => "groups of aircraft are not known here; name each aircraft",
-        "RSZONER" | "RSZONEDH" | "RFACV" | "RESOFACV" | "RESOZONER" | "RESOZONEDH" | "DTNOLOOK" => {
+        "RSZONER" | "RSZONEDH" | "RESOFACV" | "RESOZONER" | "RESOZONEDH" | "DTNOLOOK" => {
             "this setting of the resolution is not known here"
         }
         "ADSB" | "TREACT" | "DTREACT" => {

@@ -3,7 +3,9 @@
 use super::{
     CommandError, CommandOutcome, CommandResult, Interpreter, canonical_name, refusal, upper,
 };
-use crate::bluesky::traffic::{AircraftSetting, ResolutionMethod, Setting, TimedSetting, Wind};
+use crate::bluesky::traffic::{
+    AircraftSetting, HorizontalResolution, ResolutionMethod, Setting, TimedSetting, Wind,
+};
 use crate::bluesky::values::{
     Arguments, ZONE_HALF_HEIGHTS_FT, ZONE_RADII_NM, altitude_ft, duration_s, heading_deg, number,
     on_off, positive, zone_size,
@@ -154,7 +156,12 @@ impl Interpreter {
                 let factor = positive(place, value)?;
                 self.add_setting("RFACH", Setting::ResolutionFactor(factor));
             }
-            "RMETHH" | "RMETHV" => return Ok(self.limit_resolution(name, value)),
+            "RFACV" => {
+                let factor = positive(place, value)?;
+                self.add_setting("RFACV", Setting::VerticalResolutionFactor(factor));
+            }
+            "RMETHH" => return Ok(self.limit_horizontal_resolution(value)),
+            "RMETHV" => return Ok(self.limit_vertical_resolution(value)),
             "PRIORULES" => return Ok(priority_rules(arguments, value)),
             "NOISE" => {
                 let is_on = on_off(place, value)?;
@@ -170,16 +177,37 @@ impl Interpreter {
         Ok(CommandOutcome::Done)
     }
 
-    /// `RMETHH HDG` and `RMETHV OFF` are what MVP does here; all else is named.
-    fn limit_resolution(&mut self, name: &str, value: Token) -> CommandOutcome {
-        self.has_resolution_limits |= name == "RMETHH";
-        match (name, upper(value).as_str()) {
-            ("RMETHH", "HDG") | ("RMETHV", "OFF" | "OF" | "NONE") => CommandOutcome::Done,
-            (_, value) => {
-                let reason = "MVP here changes headings only, as with RMETHH HDG";
-                CommandOutcome::NotUnderstood(format!("{name} {value}"), reason)
+    /// `RMETHH`: what MVP changes in the horizontal.
+    fn limit_horizontal_resolution(&mut self, value: Token) -> CommandOutcome {
+        let resolution = match upper(value).as_str() {
+            "ON" | "BOTH" => HorizontalResolution::Both,
+            "SPD" => HorizontalResolution::Speed,
+            "HDG" => HorizontalResolution::Heading,
+            "OFF" | "OF" | "NONE" => HorizontalResolution::Off,
+            other => {
+                let reason = "write RMETHH BOTH, SPD, HDG or OFF";
+                return CommandOutcome::NotUnderstood(format!("RMETHH {other}"), reason);
             }
-        }
+        };
+        self.has_resolution_limits = true;
+        self.add_setting("RMETHH", Setting::HorizontalResolution(resolution));
+        CommandOutcome::Done
+    }
+
+    /// `RMETHV`: whether MVP changes vertical speeds, and nothing else.
+    fn limit_vertical_resolution(&mut self, value: Token) -> CommandOutcome {
+        let is_on = match upper(value).as_str() {
+            "ON" | "V/S" => true,
+            "OFF" | "OF" | "NONE" => false,
+            other => {
+                let reason = "write RMETHV V/S or OFF";
+                return CommandOutcome::NotUnderstood(format!("RMETHV {other}"), reason);
+            }
+        };
+        // Off it leaves the horizontal as it is.
+        self.has_resolution_limits |= is_on;
+        self.add_setting("RMETHV", Setting::VerticalResolution(is_on));
+        CommandOutcome::Done
     }
 
     /// `WIND place,direction,speed`, or `WIND place` followed by `altitude,direction,speed` for

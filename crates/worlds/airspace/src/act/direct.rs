@@ -1,6 +1,7 @@
 //! One process that decides for all airplanes of a group.
 
 use crate::avoid::NonCooperativeAvoidance;
+use crate::baseline::ReactiveMemory;
 use crate::decide::{DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_for_group};
 use crate::events::{Event, EventKind};
 use crate::flight::KnownAircraft;
@@ -28,11 +29,12 @@ pub(super) fn decide(
     } else {
         own.iter().zip(&all).map(|(own, (_, one))| unshielded_maneuver(own, one)).collect()
     };
-    for ((control, _), maneuver) in all.iter_mut().zip(maneuvers) {
+    for ((control, considered), maneuver) in all.iter_mut().zip(maneuvers) {
         if world.has_resolution_memory() {
             control.memory.record_maneuver(&maneuver);
         }
         control.maneuver = maneuver;
+        control.memory.command = considered.command;
     }
     all
 }
@@ -86,11 +88,14 @@ fn decide_together(
     memories: &mut [PilotMemory],
     now: Cycle,
 ) -> Vec<ManeuverCandidates> {
-    let mut resolving: Vec<_> =
-        memories.iter_mut().map(|memory| std::mem::take(&mut memory.resolving)).collect();
-    let candidates = candidates_for_group(world, group, non_cooperative, &mut resolving, now);
-    for (memory, resolving) in memories.iter_mut().zip(resolving) {
-        memory.resolving = resolving;
+    let mut kept: Vec<ReactiveMemory> = Vec::with_capacity(memories.len());
+    for memory in memories.iter_mut() {
+        let resolving = std::mem::take(&mut memory.resolving);
+        kept.push(ReactiveMemory { resolving, command: memory.command });
+    }
+    let candidates = candidates_for_group(world, group, non_cooperative, &mut kept, now);
+    for (memory, kept) in memories.iter_mut().zip(kept) {
+        memory.resolving = kept.resolving;
     }
     candidates
 }

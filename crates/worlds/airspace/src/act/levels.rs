@@ -8,6 +8,7 @@
 
 use super::protect::shielded_aircraft;
 use crate::avoid::NonCooperativeAvoidance;
+use crate::events::{Event, EventKind};
 use crate::flight::FlightLevelRange;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::perceive::{non_cooperative_aircraft, ownship_state};
@@ -25,7 +26,11 @@ pub(super) fn keep_levels(context: &PhaseContext<'_>, group: &[EntitySlot]) {
 
 /// Clears the changes of level of a group for the next `dt`: with the shield, as far as is safe. `flown` are the group's
 /// airplanes that the method flies, by id.
-pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flown: &[EntitySlot]) {
+pub(super) fn clear_levels(
+    context: &mut PhaseContext<'_>,
+    group: &[EntitySlot],
+    flown: &[EntitySlot],
+) {
     let PhaseContext { world, state, now, .. } = *context;
     let is_changing = |slot: EntitySlot| {
         let segment = state.segment(world, slot);
@@ -62,12 +67,28 @@ pub(super) fn clear_levels(context: &PhaseContext<'_>, group: &[EntitySlot], flo
             state.clear_to(slot, segment.altitude_m);
         } else {
             state.clear_to(slot, altitude_m);
-            current.waits.set(current.waits.get().saturating_add(1));
+            record_wait(context, slot, altitude_m);
         }
         current.fallback.set(fallback);
         all[k].fallback = fallback;
         all[k].levels = FlightLevelRange::between(current.altitude_m.get(), altitude_m);
         all[k].drift = drift(altitude_m);
+    }
+}
+
+/// Records that an airplane has to level off at an altitude in meters short of where it may get in this `dt`: as a delay of
+/// its order, or of the command of its method, which is told if it can do nothing of it.
+fn record_wait(context: &mut PhaseContext<'_>, slot: EntitySlot, altitude_m: f64) {
+    let &mut PhaseContext { state, now, ref mut scratch, .. } = context;
+    let current = &state.airplanes[slot as usize];
+    let command = state.command(slot);
+    if command.in_force.level.is_none() {
+        current.waits.set(current.waits.get().saturating_add(1));
+        return;
+    }
+    scratch.events.push(Event::new(now, EventKind::CommandHeld, slot));
+    if command.wish.level.is_some() && altitude_m == current.altitude_m.get() {
+        state.record_command_override(slot);
     }
 }
 

@@ -5,7 +5,7 @@
 //! is accepted at once, and the way to it cleared in stages (`levels.rs`).
 
 use super::protect::shielded_aircraft;
-use crate::flight::{DoneOrders, FlightOrder};
+use crate::flight::{AircraftModel, DoneOrders, FlightOrder};
 use crate::scratch::PhaseContext;
 use crate::shield::{Fallback, ShieldedAircraft, safe_fallback};
 use sidestep_kernel::EntitySlot;
@@ -45,14 +45,27 @@ fn fallback_after_order(
 ) -> Option<Fallback> {
     let PhaseContext { world, state, now, .. } = context;
     let current = &state.airplanes[slot as usize];
-    if !world.shield || order.task.speed_m_s().is_none() || world.is_non_cooperative(slot, *now) {
+    let is_speed_commanded = state.command_in_force(slot).v_m_s.is_some();
+    let keeps_speed = order.task.speed_m_s().is_none() || is_speed_commanded;
+    if !world.shield || keeps_speed || world.is_non_cooperative(slot, *now) {
         return Some(current.fallback.get());
     }
     let segment = world.segment(slot, u32::from(current.orders.get()) + 1);
+    fallback_at_speed(context, flown, slot, &segment.model)
+}
+
+/// Returns the fallback with which an airplane is apart from the stored ones of all others of its group once it flies
+/// with the speed of `model`, if there is one.
+pub(super) fn fallback_at_speed(
+    context: &PhaseContext<'_>,
+    flown: &[EntitySlot],
+    slot: EntitySlot,
+    model: &AircraftModel,
+) -> Option<Fallback> {
     let before = shielded_aircraft(context, slot);
     let changed = ShieldedAircraft {
-        v_m_s: segment.model.v_m_s,
-        omega_max_rad_s: segment.model.omega_max_rad_s,
+        v_m_s: model.v_m_s,
+        omega_max_rad_s: model.omega_max_rad_s,
         ..before.clone()
     };
     let others = flown

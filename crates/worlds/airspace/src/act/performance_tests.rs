@@ -62,7 +62,7 @@ fn orders(kind: TestType) -> impl Strategy<Value = String> {
 }
 
 /// Airplanes of several types on three levels, with orders of speed and level.
-fn mixed_crowd() -> impl Strategy<Value = String> {
+pub(super) fn mixed_crowd() -> impl Strategy<Value = String> {
     let coordinate = || -3000.0f64..3000.0;
     let one = (0usize..TYPES.len()).prop_flat_map(move |kind| {
         let kind = TYPES[kind];
@@ -85,19 +85,19 @@ fn mixed_crowd() -> impl Strategy<Value = String> {
 
 /// The speed and the altitude of an airplane.
 #[derive(Clone, Copy)]
-struct SpeedAndLevel {
-    v_m_s: f64,
-    altitude_m: f64,
+pub(super) struct SpeedAndLevel {
+    pub(super) v_m_s: f64,
+    pub(super) altitude_m: f64,
 }
 
-fn speed_and_level(run: &AirspaceRun, slot: usize) -> SpeedAndLevel {
+pub(super) fn speed_and_level(run: &AirspaceRun, slot: usize) -> SpeedAndLevel {
     let segment = run.state().segment(run.world(), slot as EntitySlot);
     let altitude_m = run.state().airplanes[slot].altitude_m.get();
     SpeedAndLevel { v_m_s: segment.model.v_m_s, altitude_m }
 }
 
 /// Flies some cycles, and checks in each that no airplane does more than it can.
-fn fly_within_limits(run: &mut AirspaceRun, cycles: u64) -> Result<(), TestCaseError> {
+pub(super) fn fly_within_limits(run: &mut AirspaceRun, cycles: u64) -> Result<(), TestCaseError> {
     let world = run.world().clone();
     let dt_s = world.timing.dt_s;
     for _ in 0..cycles {

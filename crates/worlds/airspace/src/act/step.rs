@@ -63,7 +63,7 @@ fn fly(
             flight.altitude_m = altitude_m;
             let before = flight.pose;
             flight.pose = air.after_wind_step(before.step(segment.model.v_m_s, omega, dtau_s));
-            let autopilot = air.autopilot(segment.model, &flight.mission);
+            let autopilot = air.autopilot(&segment.model, &flight.mission);
             flight.next = autopilot.next_way_point((before, flight.pose), flight.next);
             flight.next == segment.mission.len()
         }
@@ -97,7 +97,7 @@ fn count_maneuver(air: &FlightConditions, flight: &mut AircraftCycleMotion<'_>, 
             return;
         }
     }
-    let autopilot = air.autopilot(segment.model, &flight.mission);
+    let autopilot = air.autopilot(&segment.model, &flight.mission);
     let planned_rad_s = air.steer(&autopilot, flight.pose, flight.next);
     effort.add_maneuver_step(&Maneuvering { omega_rad_s, planned_rad_s, omega_max_rad_s });
 }

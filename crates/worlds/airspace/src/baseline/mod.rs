@@ -5,9 +5,18 @@ pub(super) mod bands;
 pub(super) mod mvp;
 pub(super) mod orca;
 
-use super::flight::{FlightLevelRange, Point};
+use super::flight::{FlightLevelRange, MethodCommand, Point};
 use super::settings::ReactiveSettings;
 use sidestep_kernel::{EntitySlot, math};
+
+/// What a method that considers airplanes once per step of `dtau` keeps of one of them from step to step.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ReactiveMemory {
+    /// The conflicts that it resolves by MVP.
+    pub(crate) resolving: mvp::ActiveResolutions,
+    /// What the method has commanded last.
+    pub(crate) command: MethodCommand,
+}
 
 /// The part of an airplane that a method knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +36,10 @@ pub struct AircraftState {
     /// Distance in meters within which no other airplane should come; of those that avoid nobody, enlarged by how far
     /// they may fly within `dt`.
     pub separation_m: f64,
+    /// Altitude in meters.
+    pub altitude_m: f64,
+    /// Rate of climb in meters per second, negative downward.
+    pub climb_m_s: f64,
     /// The levels that it is on, or passes as far as the method looks ahead.
     pub levels: FlightLevelRange,
     /// Whether it gives way to others, too.
@@ -55,6 +68,8 @@ pub(crate) fn test_aircraft(slot: EntitySlot, at: Point, heading_rad: f64) -> Ai
         drift: [0.0; 2],
         preferred_rad: heading_rad,
         separation_m: 500.0,
+        altitude_m: 0.0,
+        climb_m_s: 0.0,
         levels: FlightLevelRange::from_level(0.0),
         yields: true,
     }

@@ -1,18 +1,25 @@
-//! Modified voltage potential, as BlueSky flies it with resolutions by heading only (its version
-//! 1.1.1: `STATEBASED`, `MVP`, `RMETHH HDG`).
+//! Modified voltage potential, as BlueSky flies it (its version 1.1.1: `STATEBASED`, `MVP`), with resolutions by heading,
+//! speed, both, vertical speed or all of these (`RMETHH`, `RMETHV`).
 //!
 //! A conflict is found from the present velocities, also between two that have already come too near
 //! and fly apart. Each airplane then changes its present velocity so that the closest point moves out
 //! of the other's zone. It keeps to this, also after the conflict is no longer predicted, until the
-//! two are past their closest point and apart; then it flies to its way-point again.
+//! two are past their closest point and apart; then it flies to its way-point again, on its filed level and with its
+//! filed speed. Only what the resolution may change is changed: by speed alone it keeps its heading.
+//!
+//! Where BlueSky's formula for the vertical resolves nothing, ours differs. It gives both of a pair on one level, or whose
+//! vertical speeds are equal, the same direction: both descend, and stay on one level. Ours sends the upper one up and
+//! the lower one down (of two on one level that with the smaller number up), and so, too, a pair that already flies apart
+//! in the vertical. BlueSky's takes the time until the zone is entered as time to resolve also within the zone,
+//! where it is negative; ours is then the time that the fastest change takes.
 //!
 //! Its authors fly it alone. Beside the shield an airplane may fly something else than it wished, and a conflict of that
 //! velocity, or a heading to keep from it, would lead it ever farther astray. So after an override it forgets what it resolves,
 //! and looks for conflicts as if it flew to its way-point, until that way is free.
 
 use super::{AircraftState, vector_length};
-use crate::flight::Point;
-use crate::settings::ReactiveSettings;
+use crate::flight::{CommandKinds, Point, SpeedFactors};
+use crate::settings::{ReactiveSettings, Resolution as Axes};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::{EntitySlot, math};
@@ -25,6 +32,13 @@ const MAX_HEAD_ON_M: f64 = 10.0;
 const MAX_SIDE_BY_SIDE_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Squared speed in m²/s² below which two airplanes do not move against each other.
 const MIN_SPEED_SQUARED: f64 = 1e-6;
+
+/// Vertical speed in meters per second below which two airplanes do not move against each other in the vertical. BlueSky's
+/// value.
+const MIN_CLIMB_M_S: f64 = 1e-6;
+/// Rate in meters per second at which two that are within each other's zone are to leave it in the vertical: faster than
+/// airplanes fly, so that each does what it can.
+const IN_ZONE_CLIMB_M_S: f64 = 30.0;
 
 /// The conflicts that an airplane resolves, from one step to the next.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -55,23 +69,79 @@ impl ActiveResolutions {
     }
 }
 
+/// How MVP resolves conflicts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResolutionSettings {
+    /// What airplanes change.
+    pub resolution: Axes,
+    /// Factor on the height between levels, to which conflicts are resolved in the vertical.
+    pub vertical_factor: f64,
+    /// Seconds before a loss by which levels are apart; 0 as in BlueSky. The shield needs that time, because it plans until
+    /// both of a pair orbit.
+    pub vertical_lead_s: f64,
+    /// The speeds that are commanded.
+    pub speeds: SpeedFactors,
+}
+
+impl ResolutionSettings {
+    /// Returns what is commanded beside headings.
+    pub(crate) fn command_kinds(&self) -> CommandKinds {
+        CommandKinds {
+            levels: self.resolution.changes_level(),
+            speeds: self.resolution.changes_speed().then_some(self.speeds),
+        }
+    }
+}
+
+/// The rules by which conflicts are found and resolved.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MvpRules {
+    pub(crate) settings: ReactiveSettings,
+    pub(crate) resolution: ResolutionSettings,
+    /// Height between levels that is enough, in meters.
+    pub(crate) vertical_m: f64,
+}
+
+/// What an airplane flies to resolve its conflicts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Resolution {
+    /// Heading in radians.
+    pub(crate) heading_rad: f64,
+    /// Airspeed in meters per second; none if it keeps to what was commanded before, or speeds are not changed.
+    pub(crate) v_m_s: Option<f64>,
+    /// Change of level; none likewise.
+    pub(crate) vertical: Option<VerticalResolution>,
+}
+
+/// A vertical speed for some time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct VerticalResolution {
+    /// Rate of climb in meters per second, negative downward.
+    pub(crate) climb_m_s: f64,
+    /// Seconds after which the conflict is resolved.
+    pub(crate) within_s: f64,
+}
+
 /// A closest approach that two airplanes will have, or have had, if both fly straight on.
 struct ClosestApproach {
     /// The other's position then, relative to the airplane.
     at: Point,
     /// Seconds from now.
     in_s: f64,
+    /// Seconds until the one enters the other's zone, negative within it.
+    enters_in_s: f64,
 }
 
-/// Returns the heading of each airplane, in radians; `None` for one that flies to its way-point.
+/// Returns the resolution of each airplane; `None` for one that flies as filed.
 /// `meets` returns the second of two, by their places, as the first sees it, if they are on one level and near enough to
 /// be in conflict.
-pub(crate) fn resolution_headings(
+pub(crate) fn resolutions(
     all: &[AircraftState],
     resolving: &mut [ActiveResolutions],
-    settings: ReactiveSettings,
+    rules: &MvpRules,
     meets: impl Fn(usize, usize) -> Option<AircraftState>,
-) -> Vec<Option<f64>> {
+) -> Vec<Option<Resolution>> {
+    let settings = rules.settings;
     let intended: Vec<AircraftState> =
         all.iter().zip(&*resolving).map(|(own, memory)| intended_state(own, memory)).collect();
     let mut conflicts = Vec::with_capacity(all.len());
@@ -79,7 +149,7 @@ pub(crate) fn resolution_headings(
         let mut own_conflicts = Vec::new();
         for j in (0..all.len()).filter(|&j| all[j].slot != own.slot) {
             if let Some(other) = meets(i, j)
-                && let Some(closest) = find_conflict(own, &other, settings)
+                && let Some(closest) = rules.find_conflict(own, &other)
             {
                 own_conflicts.push((other, closest));
             }
@@ -92,7 +162,10 @@ pub(crate) fn resolution_headings(
     let each = intended.iter().zip(&conflicts).enumerate();
     for ((i, (own, own_conflicts)), memory) in each.zip(&mut *resolving) {
         if has_conflict {
-            memory.heading_rad = resolution_heading_rad(own, own_conflicts, settings);
+            let velocity = resolved_velocity(own, own_conflicts, settings);
+            let is_turning = rules.resolution.resolution.changes_heading();
+            let direction = velocity.filter(|_| is_turning);
+            memory.heading_rad = direction.map_or(own.heading_rad, |[vx, vy]| math::atan2(vy, vx));
         }
         memory.with.extend(own_conflicts.iter().map(|(other, _)| other.slot));
         memory.with.sort_unstable();
@@ -104,7 +177,115 @@ pub(crate) fn resolution_headings(
         });
         memory.is_overridden &= !memory.with.is_empty();
     }
-    resolving.iter().map(|memory| (!memory.with.is_empty()).then_some(memory.heading_rad)).collect()
+    let each = resolving.iter().zip(intended.iter().zip(&conflicts));
+    each.map(|(memory, (own, own_conflicts))| {
+        (!memory.with.is_empty()).then(|| Resolution {
+            heading_rad: memory.heading_rad,
+            v_m_s: rules.resolved_speed_m_s(own, own_conflicts),
+            vertical: rules.vertical_resolution(own, own_conflicts),
+        })
+    })
+    .collect()
+}
+
+/// An airplane with which another one is in conflict, as that one sees it, and their closest approach.
+type Conflict = (AircraftState, ClosestApproach);
+
+impl MvpRules {
+    /// Returns the closest approach of two airplanes in conflict. By levels these are pairs on one level; where levels are
+    /// changed, those that enter each other's zone in the vertical, too, at the same time.
+    fn find_conflict(&self, own: &AircraftState, other: &AircraftState) -> Option<ClosestApproach> {
+        if !self.resolution.resolution.changes_level() {
+            return find_conflict(own, other, self.settings);
+        }
+        let closest = find_conflict(own, other, self.settings)?;
+        let [from_s, until_s] = vertical_conflict_s(own, other, self.vertical_m);
+        let leaves_in_s = 2.0 * closest.in_s - closest.enters_in_s;
+        let enters_in_s = closest.enters_in_s.max(from_s);
+        let is_at_once = enters_in_s <= leaves_in_s.min(until_s) && leaves_in_s.min(until_s) > 0.0;
+        (is_at_once && enters_in_s < self.settings.look_ahead_s)
+            .then_some(ClosestApproach { enters_in_s, ..closest })
+    }
+
+    /// Returns the airspeed that resolves conflicts, if speeds are changed and there are any.
+    fn resolved_speed_m_s(&self, own: &AircraftState, conflicts: &[Conflict]) -> Option<f64> {
+        if !self.resolution.resolution.changes_speed() {
+            return None;
+        }
+        resolved_velocity(own, conflicts, self.settings).map(vector_length)
+    }
+
+    /// Returns the vertical speed that resolves conflicts, if levels are changed and there are any: all changes added, for
+    /// the shortest of the times that the conflicts leave.
+    fn vertical_resolution(
+        &self,
+        own: &AircraftState,
+        conflicts: &[Conflict],
+    ) -> Option<VerticalResolution> {
+        if !self.resolution.resolution.changes_level() || conflicts.is_empty() {
+            return None;
+        }
+        let mut climb_m_s = own.climb_m_s;
+        let mut within_s = f64::INFINITY;
+        for (other, closest) in conflicts {
+            let change = self.vertical_change(own, other, closest);
+            climb_m_s += change.climb_m_s;
+            within_s = within_s.min(change.within_s);
+        }
+        Some(VerticalResolution { climb_m_s, within_s })
+    }
+
+    /// Returns an airplane's change of vertical speed by one conflict, half of what resolves it if the other gives way, too,
+    /// and the time that this takes.
+    fn vertical_change(
+        &self,
+        own: &AircraftState,
+        other: &AircraftState,
+        closest: &ClosestApproach,
+    ) -> VerticalResolution {
+        let zone_m = self.vertical_m * self.resolution.vertical_factor;
+        let above_m = other.altitude_m - own.altitude_m;
+        let closing_m_s = other.climb_m_s - own.climb_m_s;
+        let is_crossing = above_m * closing_m_s < 0.0;
+        let crosses_in_s = (above_m / closing_m_s).abs();
+        let least_s = 0.5 * zone_m / IN_ZONE_CLIMB_M_S;
+        let enters_in_s = if closest.enters_in_s > 0.0 {
+            let ahead_s = closest.enters_in_s - self.resolution.vertical_lead_s;
+            // The lead leaves as little time as two have that are too near already.
+            ahead_s.max(least_s.min(closest.enters_in_s))
+        } else {
+            least_s
+        };
+        // Who is to come out above: the one that is above now, or of two on one level the one with the smaller number.
+        let is_upper = above_m < 0.0 || (above_m == 0.0 && own.slot < other.slot);
+        let away = if is_upper { 1.0 } else { -1.0 };
+        let (shortfall_m, within_s) = if is_crossing && crosses_in_s <= self.settings.look_ahead_s {
+            (zone_m, crosses_in_s)
+        } else if closing_m_s == 0.0 {
+            (zone_m - above_m.abs(), enters_in_s)
+        } else {
+            (zone_m, enters_in_s)
+        };
+        // One that need not give way leaves all to the other.
+        let share = if other.yields { 0.5 } else { 1.0 };
+        VerticalResolution { climb_m_s: share * away * shortfall_m / within_s, within_s }
+    }
+}
+
+/// Returns the times in seconds between which two airplanes are nearer to each other in the vertical than `vertical_m`.
+fn vertical_conflict_s(own: &AircraftState, other: &AircraftState, vertical_m: f64) -> [f64; 2] {
+    let above_m = other.altitude_m - own.altitude_m;
+    let closing_m_s = other.climb_m_s - own.climb_m_s;
+    if closing_m_s.abs() < MIN_CLIMB_M_S {
+        let is_near = above_m.abs() < vertical_m;
+        return if is_near {
+            [f64::NEG_INFINITY, f64::INFINITY]
+        } else {
+            [f64::INFINITY, f64::NEG_INFINITY]
+        };
+    }
+    let times_s = [-vertical_m, vertical_m].map(|gap_m| (gap_m - above_m) / closing_m_s);
+    [times_s[0].min(times_s[1]), times_s[0].max(times_s[1])]
 }
 
 /// Returns an airplane as it means to fly: with its velocity, or after an override with that toward its way-point.
@@ -164,18 +345,21 @@ fn find_conflict(
         return None;
     }
     let half_s = (zone_m * zone_m - miss2).sqrt() / speed2.sqrt();
-    (in_s + half_s > 0.0 && in_s - half_s < settings.look_ahead_s)
-        .then_some(ClosestApproach { at, in_s })
+    (in_s + half_s > 0.0 && in_s - half_s < settings.look_ahead_s).then_some(ClosestApproach {
+        at,
+        in_s,
+        enters_in_s: in_s - half_s,
+    })
 }
 
-/// Returns the heading that resolves an airplane's conflicts; its present one without any.
-fn resolution_heading_rad(
+/// Returns the horizontal velocity that resolves an airplane's conflicts; `None` without any.
+fn resolved_velocity(
     own: &AircraftState,
-    conflicts: &[(AircraftState, ClosestApproach)],
+    conflicts: &[Conflict],
     settings: ReactiveSettings,
-) -> f64 {
+) -> Option<Point> {
     if conflicts.is_empty() {
-        return own.heading_rad;
+        return None;
     }
     let [mut vx, mut vy] = own.velocity;
     for (other, closest) in conflicts {
@@ -183,7 +367,7 @@ fn resolution_heading_rad(
         vx -= change_x;
         vy -= change_y;
     }
-    math::atan2(vy, vx)
+    Some([vx, vy])
 }
 
 /// Returns the change of the other's velocity, seen from `own`, with which it would miss the zone.
@@ -239,8 +423,16 @@ mod tests {
     const SETTINGS: ReactiveSettings =
         ReactiveSettings { look_ahead_s: 90.0, margin: 1.0, resolution_factor: 1.05 };
 
+    fn rules(resolution: Axes) -> MvpRules {
+        let speeds = SpeedFactors { least: 0.5, largest: 2.0 };
+        let resolution =
+            ResolutionSettings { resolution, vertical_factor: 1.05, vertical_lead_s: 0.0, speeds };
+        MvpRules { settings: SETTINGS, resolution, vertical_m: 300.0 }
+    }
+
     fn looked(all: &[AircraftState], memory: &mut [ActiveResolutions]) -> Vec<Option<f64>> {
-        resolution_headings(all, memory, SETTINGS, |_, j| Some(all[j]))
+        let found = resolutions(all, memory, &rules(Axes::Heading), |_, j| Some(all[j]));
+        found.into_iter().map(|one| one.map(|one| one.heading_rad)).collect()
     }
 
     /// The headings that BlueSky 1.1.1 commands for the same poses after one look (`traf.cr.trk`, as
@@ -269,6 +461,132 @@ mod tests {
                 let found_deg = found.expect("a conflict").to_degrees();
                 assert!((found_deg - expected).abs() < 1e-3, "{found_deg} for {expected}");
             }
+        }
+    }
+
+    /// An airplane with its altitude and its rate of climb.
+    fn test_aircraft_in_space(
+        slot: EntitySlot,
+        (at, deg, altitude_m, climb_m_s): (Point, f64, f64, f64),
+    ) -> AircraftState {
+        let flat = test_aircraft(slot, at, deg.to_radians());
+        AircraftState { altitude_m, climb_m_s, ..flat }
+    }
+
+    /// Returns the resolutions of some airplanes that had no conflicts before.
+    fn resolved(poses: &[(Point, f64, f64, f64)], axes: Axes) -> Vec<Option<Resolution>> {
+        let all: Vec<AircraftState> =
+            (0..).zip(poses).map(|(slot, &pose)| test_aircraft_in_space(slot, pose)).collect();
+        let mut memory = vec![ActiveResolutions::default(); all.len()];
+        resolutions(&all, &mut memory, &rules(axes), |_, j| Some(all[j]))
+    }
+
+    /// What BlueSky 1.1.1 commands after one look (`traf.cr.trk`, `tas`, `vs` and `alt`) with `RMETHH SPD`, `RMETHH BOTH`,
+    /// `RMETHV V/S` and `RMETHH OFF`, a zone of 500 m and 300 m, `RFACH 1.05`, `RFACV 1.05`, `DTLOOK 90` and limits that
+    /// nobody comes to; as degrees counterclockwise from east, and meters above the altitude 0 of the poses.
+    #[test]
+    fn speeds_are_those_of_bluesky() {
+        let crossing = [([0.0, 0.0], 0.0, 0.0, 0.0), ([2000.0, -1900.0], 90.0, 0.0, 0.0)];
+        let third = ([2500.0, 100.0], 170.0, 0.0, 0.0);
+        let three = [crossing[0], crossing[1], third];
+        let near = [([0.0, 0.0], 0.0, 0.0, 0.0), ([-300.0, 50.0], 180.0, 0.0, 0.0)];
+        let cases: [(&[_], &[(f64, f64)]); 3] = [
+            (&crossing, &[(-11.3667, 29.7246), (81.8404, 41.2762)]),
+            (&three, &[(-22.2605, 30.9344), (81.8404, 41.2762), (160.6297, 35.993)]),
+            (&near, &[(-72.4744, 116.2283), (107.5256, 116.2283)]),
+        ];
+        for (poses, expected) in cases {
+            let by_speed = resolved(poses, Axes::Speed);
+            let by_both = resolved(poses, Axes::HeadingSpeed);
+            for (k, &(deg, v_m_s)) in expected.iter().enumerate() {
+                let speed = by_speed[k].expect("a conflict");
+                let both = by_both[k].expect("a conflict");
+                assert_eq!(speed.heading_rad, poses[k].1.to_radians(), "it keeps its heading");
+                assert!((both.heading_rad.to_degrees() - deg).abs() < 1e-3, "{both:?}");
+                for found in [speed, both] {
+                    assert!((found.v_m_s.expect("a speed") - v_m_s).abs() < 1e-3, "{found:?}");
+                    assert_eq!(found.vertical, None);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn vertical_speeds_are_those_of_bluesky() {
+        let head_on = |at_m: [f64; 2], climbs_m_s: [f64; 2]| {
+            [
+                ([0.0, 0.0], 0.0, at_m[0], climbs_m_s[0]),
+                ([3000.0, 0.0], 180.0, at_m[1], climbs_m_s[1]),
+            ]
+        };
+        let climbing = head_on([250.0, -150.0], [0.0, 5.0]);
+        let hardly_descending = head_on([0.0, 120.0], [0.0, -0.5]);
+        let descending = [([0.0, 0.0], 0.0, 0.0, 2.0), ([2000.0, -1900.0], 90.0, 200.0, -4.0)];
+        let three = [
+            ([0.0, 0.0], 0.0, 0.0, 3.0),
+            ([3000.0, 0.0], 180.0, 250.0, 0.0),
+            ([2000.0, -1900.0], 90.0, 200.0, -4.0),
+        ];
+        let cases: [(&[_], &[(f64, f64)]); 4] = [
+            (&climbing, &[(1.9688, 407.5), (3.0312, 92.5)]),
+            (&hardly_descending, &[(-4.41, -157.5), (3.91, 259.643)]),
+            (&descending, &[(-2.725, -90.833), (0.725, 224.167)]),
+            (&three, &[(-4.4025, -125.786), (1.89, 407.5), (1.5125, 243.214)]),
+        ];
+        for (poses, expected) in cases {
+            for axes in [Axes::Vertical, Axes::HeadingSpeedVertical] {
+                let found = resolved(poses, axes);
+                for ((found, pose), &(climb_m_s, to_m)) in found.iter().zip(poses).zip(expected) {
+                    let vertical = found.expect("a conflict").vertical.expect("a vertical one");
+                    assert!((vertical.climb_m_s - climb_m_s).abs() < 1e-3, "{vertical:?}");
+                    let reached_m = pose.2 + vertical.climb_m_s * vertical.within_s;
+                    assert!((reached_m - to_m).abs() < 2e-2, "{reached_m} for {to_m}");
+                }
+            }
+        }
+        let all = resolved(&climbing, Axes::HeadingSpeedVertical)[0].expect("a conflict");
+        assert!((all.heading_rad.to_degrees() - 19.2191).abs() < 1e-3, "{all:?}");
+        assert!((all.v_m_s.expect("a speed") - 37.0658).abs() < 1e-3, "{all:?}");
+    }
+
+    /// BlueSky sends both of them down: by 2.73 m/s of these two, of which each is to descend by 97.5 m.
+    #[test]
+    fn of_two_that_keep_their_levels_the_upper_one_climbs_as_fast_as_bluesky_lets_both_descend() {
+        let climbs = |above_m: f64| {
+            let poses = [([0.0, 0.0], 0.0, 0.0, 0.0), ([3000.0, 0.0], 180.0, above_m, 0.0)];
+            let vertical = |one: Option<Resolution>| one.and_then(|one| one.vertical);
+            resolved(&poses, Axes::Vertical)
+                .into_iter()
+                .map(|one| vertical(one).expect("a vertical one"))
+                .collect::<Vec<_>>()
+        };
+        for (above_m, sign) in [(120.0, 1.0), (-120.0, -1.0)] {
+            let found = climbs(above_m);
+            assert!((found[1].climb_m_s - sign * 2.73).abs() < 1e-3, "{found:?}");
+            assert_eq!(found[0].climb_m_s, -found[1].climb_m_s);
+            assert!((found[0].climb_m_s * found[0].within_s + sign * 97.5).abs() < 1e-2);
+        }
+        let on_one_level = climbs(0.0);
+        assert!(on_one_level[0].climb_m_s > 0.0 && on_one_level[1].climb_m_s < 0.0);
+    }
+
+    #[test]
+    fn a_pair_that_is_apart_in_the_vertical_when_it_is_near_is_in_no_conflict() {
+        // The other has climbed past its level long before they meet.
+        let passes = [([0.0, 0.0], 0.0, 0.0, 0.0), ([6000.0, 0.0], 180.0, -200.0, 9.0)];
+        assert_eq!(resolved(&passes, Axes::Vertical), [None, None]);
+        let meets = [([0.0, 0.0], 0.0, 0.0, 0.0), ([6000.0, 0.0], 180.0, -200.0, 2.0)];
+        assert!(resolved(&meets, Axes::Vertical).iter().all(Option::is_some));
+        let above = [([0.0, 0.0], 0.0, 0.0, 0.0), ([6000.0, 0.0], 180.0, 300.0, 0.0)];
+        assert_eq!(resolved(&above, Axes::Vertical), [None, None]);
+    }
+
+    #[test]
+    fn two_within_each_others_zone_leave_it_in_the_vertical_as_fast_as_they_can() {
+        let inside = [([0.0, 0.0], 0.0, 0.0, 0.0), ([300.0, 0.0], 180.0, 50.0, 0.0)];
+        for (found, sign) in resolved(&inside, Axes::Vertical).into_iter().zip([-1.0, 1.0]) {
+            let vertical = found.and_then(|one| one.vertical).expect("a vertical one");
+            assert!(sign * vertical.climb_m_s > 20.0, "{vertical:?}");
         }
     }
 

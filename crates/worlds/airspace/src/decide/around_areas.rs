@@ -38,7 +38,7 @@ pub(super) fn has_areas_ahead(world: &AirspaceWorld, known: KnownAircraft, now: 
 /// Returns the areas that an airplane may come to while the method looks ahead, and some seconds more.
 fn areas_ahead(world: &AirspaceWorld, aircraft: SteeredAircraft, more_s: f64) -> LocalAreas {
     let SteeredAircraft { known, now, elapsed_s } = aircraft;
-    let segment = world.segment(known.slot, known.orders);
+    let segment = world.known_segment(known);
     let seconds = world.reactive_settings().look_ahead_s + more_s;
     let reach_m = segment.model.v_m_s * seconds + segment.model.separation_m;
     let mut context = world.area_context(now, seconds);

@@ -20,7 +20,7 @@ pub(super) fn candidates_for_external_action(
     match external_action {
         Some(&ExternalAction::TurnRate(omega_rad_s)) => {
             // Its bank may allow less at the speed that it has by now than at its start.
-            let max_rad_s = world.segment(known.slot, known.orders).model.omega_max_rad_s;
+            let max_rad_s = world.known_segment(known).model.omega_max_rad_s;
             let omega_rad_s = omega_rad_s.clamp(-max_rad_s, max_rad_s);
             let omegas_rad_s = vec![omega_rad_s; world.timing.points_per_dt()];
             ManeuverCandidates::from_profiles(rank_by_similarity(

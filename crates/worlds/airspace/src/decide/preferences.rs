@@ -2,7 +2,7 @@
 
 use super::local_flight::LocalFlight;
 use crate::agents::ActionChoice;
-use crate::flight::{Action, KnownAircraft, TimeDiscretization, TurnAction};
+use crate::flight::{Action, FlightChange, KnownAircraft, TimeDiscretization, TurnAction};
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
 
@@ -35,7 +35,9 @@ fn rate_difference_rad_s(action: Action, desired_rad_s: f64) -> f64 {
         TurnAction::Hold { omega_rad_s }
         | TurnAction::Then { omega_rad_s, .. }
         | TurnAction::Leg { omega_rad_s, .. } => (omega_rad_s - desired_rad_s).abs(),
-        TurnAction::Proceed => -1.0,
+        TurnAction::Proceed if action.change == FlightChange::NONE => -1.0,
+        // After the optimal action, because its turn profile is the same.
+        TurnAction::Proceed => -0.5,
     }
 }
 

@@ -7,8 +7,11 @@
 use super::around_areas::{SteeredAircraft, has_areas_ahead, steer_around_areas};
 use super::local_flight::LocalFlight;
 use super::preferences::{rank_by_turn_difference, turn_profiles_from_actions};
-use crate::baseline::{AircraftState, bands, mvp, orca};
-use crate::flight::{Frame, InterOrderSegment, KnownAircraft, Point, Pose2, Surface};
+use crate::baseline::{AircraftState, ReactiveMemory, bands, mvp, orca};
+use crate::flight::{
+    Frame, InterOrderSegment, KnownAircraft, LevelCommand, MethodCommand, Point, Pose2, Surface,
+};
+use crate::flight_plan::CLIMB_M_S;
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::purpose;
@@ -24,8 +27,8 @@ const LOOK_AHEAD_M: f64 = 1e3;
 
 /// What a method keeps from step to step, by the place of the airplane in its group.
 struct MethodMemory<'a> {
-    /// The conflicts that airplanes resolve by MVP.
-    resolving: &'a mut [mvp::ActiveResolutions],
+    /// The conflicts that airplanes resolve by MVP, and what the method has commanded last.
+    kept: &'a mut [ReactiveMemory],
     /// The random streams of a method of the program's own; no other method draws.
     draws: Vec<Draws>,
 }
@@ -47,14 +50,16 @@ pub(super) fn profiles_by_velocity(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
     non_cooperative: &[NonCooperativeAircraft],
-    resolving: &mut [mvp::ActiveResolutions],
+    kept: &mut [ReactiveMemory],
     now: Cycle,
 ) -> Vec<Vec<TurnProfile>> {
     let mut ahead = group.to_vec();
     let mut preferred = vec![TurnProfile::default(); group.len()];
-    let mut memory = MethodMemory { resolving, draws: custom_method_draws(world, group, now) };
+    let mut memory = MethodMemory { kept, draws: custom_method_draws(world, group, now) };
     let has_areas: Vec<bool> =
         group.iter().map(|known| has_areas_ahead(world, *known, now)).collect();
+    let commands_levels = world.command_kinds().levels;
+    let dtau_s = world.timing.dtau_s;
     for k in 0..world.timing.points_per_dt() {
         let elapsed_s = k as f64 * world.timing.dtau_s;
         let others: Vec<AircraftState> = non_cooperative
@@ -70,6 +75,11 @@ pub(super) fn profiles_by_velocity(
                 steering = steer_around_areas(world, aircraft, steering);
             }
             preferred[place].omegas_rad_s.push(step(world, known, steering));
+            if commands_levels {
+                // Else nobody asks for it within a cycle: levels are those of as far as the method looks ahead.
+                let segment = world.known_segment(*known);
+                known.altitude_m = segment.altitude_after_m(known.altitude_m, dtau_s);
+            }
         }
     }
     group
@@ -130,7 +140,7 @@ fn decide_steering(
     let StepTraffic { group, others, .. } = traffic;
     let mut flying = Vec::new();
     for (k, known) in group.iter().enumerate() {
-        if known.next < world.segment(known.slot, known.orders).mission.len() {
+        if known.next < world.known_segment(*known).mission.len() {
             flying.push(k);
         }
     }
@@ -163,17 +173,21 @@ fn decide_steering(
                 let others = view.others_seen_from(place);
                 let own = &view.all[place];
                 let one = CustomMethodContext { traffic, k, own, others: &others };
-                steering[k] = one.decide(world, method, &mut memory.draws[k]);
+                let decided = one.decide(world, method, &mut memory.draws[k]);
+                steering[k] = decided.steering;
+                memory.kept[k].command = decided.command;
             }
         }
         MethodKind::Mvp => {
-            let mut resolutions: Vec<mvp::ActiveResolutions> =
-                flying.iter().map(|&k| std::mem::take(&mut memory.resolving[k])).collect();
+            let mut active: Vec<mvp::ActiveResolutions> =
+                flying.iter().map(|&k| std::mem::take(&mut memory.kept[k].resolving)).collect();
             let meets = |own: usize, other: usize| view.seen_from(own, other);
-            let found = mvp::resolution_headings(&view.all, &mut resolutions, world.mvp, meets);
-            for ((&k, heading_rad), resolution) in flying.iter().zip(found).zip(resolutions) {
-                steering[k] = heading_rad.into();
-                memory.resolving[k] = resolution;
+            let found = mvp::resolutions(&view.all, &mut active, &world.mvp_rules(), meets);
+            for ((&k, resolution), active) in flying.iter().zip(found).zip(active) {
+                steering[k] = resolution.as_ref().map(|one| one.heading_rad).into();
+                let kept = &mut memory.kept[k];
+                kept.resolving = active;
+                kept.command = mvp_command(world, group[k], resolution, kept.command);
             }
         }
         // These rank actions, and steer by none.
@@ -196,6 +210,10 @@ impl<'a> TrafficView<'a> {
     }
 
     fn is_on_level(&self, a: usize, b: usize) -> bool {
+        // Who changes its level to resolve a conflict has to mind those on its old one, and on the one that it comes to.
+        if self.world.command_kinds().levels {
+            return true;
+        }
         self.all[a].levels.overlaps(&self.all[b].levels, self.world.vertical_m)
     }
 
@@ -281,6 +299,37 @@ impl<'a> TrafficView<'a> {
     }
 }
 
+/// Returns what MVP commands of an airplane by a resolution: the speed, and the level that it reaches at the rate of the
+/// resolution, as far as it can fly it, until the conflict is resolved. Without a resolution nothing; a resolution of
+/// nothing new leaves what was commanded.
+fn mvp_command(
+    world: &AirspaceWorld,
+    known: KnownAircraft,
+    resolution: Option<mvp::Resolution>,
+    last: MethodCommand,
+) -> MethodCommand {
+    let Some(resolution) = resolution else { return MethodCommand::NONE };
+    let performance = &world.airplanes[known.slot as usize].performance;
+    let level = resolution.vertical.map(|vertical| {
+        let is_climb = vertical.climb_m_s > 0.0;
+        let limit_m_s = performance.vertical_max_m_s(is_climb);
+        // An airplane of which no limit is known changes its level as by an order without a rate.
+        let max_m_s = if limit_m_s.is_finite() { limit_m_s } else { CLIMB_M_S };
+        let climb_m_s = vertical.climb_m_s.clamp(-max_m_s, max_m_s);
+        LevelCommand {
+            altitude_m: known.altitude_m + climb_m_s * vertical.within_s,
+            vertical_m_s: climb_m_s.abs(),
+        }
+    });
+    MethodCommand { level: level.or(last.level), v_m_s: resolution.v_m_s.or(last.v_m_s) }
+}
+
+/// What a method of the program's own gives an airplane in a step.
+struct CustomDecision {
+    steering: Steering,
+    command: MethodCommand,
+}
+
 /// One airplane for which a method of the program's own decides.
 struct CustomMethodContext<'a> {
     traffic: StepTraffic<'a>,
@@ -291,10 +340,16 @@ struct CustomMethodContext<'a> {
 }
 
 impl CustomMethodContext<'_> {
-    fn decide(&self, world: &AirspaceWorld, method: &OwnMethod, draws: &mut Draws) -> Steering {
+    fn decide(
+        &self,
+        world: &AirspaceWorld,
+        method: &OwnMethod,
+        draws: &mut Draws,
+    ) -> CustomDecision {
         let StepTraffic { now, elapsed_s, group, .. } = self.traffic;
         let known = group[self.k];
-        let InterOrderSegment { model, mission, .. } = world.segment(known.slot, known.orders);
+        let InterOrderSegment { model, mission, .. } = world.known_segment(known);
+        let filed = world.segment(known.slot, known.orders);
         // On the earth all positions are those in the frame where the airplane is.
         let origin = match world.surface {
             Surface::Plane => [0.0; 2],
@@ -310,10 +365,14 @@ impl CustomMethodContext<'_> {
             own,
             way_point_m: world.surface.frame_at(known.pose.at).to_local(mission[known.next]),
             omega_max_rad_s: model.omega_max_rad_s,
+            filed_altitude_m: filed.altitude_m,
+            filed_v_m_s: filed.model.v_m_s,
+            command: known.command,
             wind_m_s: world.air_around(known).wind_m_s,
             others: &others,
         };
-        method.decide(&percept, draws)
+        let steering = method.decide(&percept, draws);
+        CustomDecision { steering, command: method.command(&percept, draws) }
     }
 }
 
@@ -336,7 +395,7 @@ fn relative_to(origin: Point, one: &AircraftState) -> AircraftState {
 /// Flies one step as steered, and returns its turn rate.
 pub(super) fn step(world: &AirspaceWorld, known: &mut KnownAircraft, steering: Steering) -> f64 {
     let flight = LocalFlight::new(world, *known, world.timing.dtau_s);
-    let LocalFlight { model, pose, frame, air, .. } = flight;
+    let LocalFlight { ref model, pose, frame, air, .. } = flight;
     let autopilot = flight.autopilot();
     let omega_max_rad_s = model.omega_max_rad_s;
     let omega_rad_s = match steering {
@@ -388,6 +447,8 @@ fn non_cooperative_state(
         drift: [0.0; 2],
         preferred_rad: turned_rad,
         separation_m: one.required_clearance_m(0.0),
+        altitude_m: one.altitude_m + one.climb_m_s * seconds,
+        climb_m_s: one.climb_m_s,
         levels: one.levels,
         yields: false,
     }
@@ -404,7 +465,7 @@ fn rotated([x, y]: Point, rad: f64) -> Point {
 
 fn aircraft_state(world: &AirspaceWorld, known: KnownAircraft) -> AircraftState {
     let flight = LocalFlight::new(world, known, world.timing.dtau_s);
-    let model = flight.model;
+    let model = &flight.model;
     let Pose2 { at, heading_rad } = known.pose;
     let v = model.v_m_s;
     let preferred_rad = flight.goal().map_or(heading_rad, |goal| {
@@ -420,6 +481,8 @@ fn aircraft_state(world: &AirspaceWorld, known: KnownAircraft) -> AircraftState 
         drift: flight.air.drift_m_s(),
         preferred_rad,
         separation_m: model.separation_m,
+        altitude_m: known.altitude_m,
+        climb_m_s: world.known_segment(known).signed_climb_m_s(known.altitude_m),
         levels: world.levels(known),
         yields: true,
     }

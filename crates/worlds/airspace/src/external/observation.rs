@@ -64,7 +64,7 @@ impl VisibleAircraft {
     ) -> Vec<Self> {
         let PhaseContext { world, state, .. } = context;
         let cooperative = members.iter().map(|known| {
-            let model = world.segment(known.slot, known.orders).model;
+            let model = world.known_segment(*known).model;
             Self {
                 slot: known.slot,
                 at: known.pose.at,
@@ -99,7 +99,7 @@ impl AgentKnowledge {
         all: &[VisibleAircraft],
     ) -> Self {
         let PhaseContext { world, state, .. } = context;
-        let InterOrderSegment { model, mission, .. } = world.segment(own.slot, own.orders);
+        let InterOrderSegment { model, mission, .. } = world.known_segment(*own);
         let ahead = mission.get(own.next..).unwrap_or_default();
         Self {
             is_due: true,
@@ -184,7 +184,7 @@ fn neighbors(
     nearest.truncate(MAX_NEIGHBORS);
     let exempt = state.exempt_ids(own.slot);
     let contacts = state.traffic_picture(own.slot);
-    let separation_m = world.segment(own.slot, own.orders).model.separation_m;
+    let separation_m = world.known_segment(*own).model.separation_m;
     nearest
         .into_iter()
         .map(|(_, other)| Neighbor {
@@ -224,7 +224,7 @@ fn delay_s(context: &PhaseContext<'_>, own: &KnownAircraft, ahead: &[Point]) -> 
     }
     let flown_s = world.cycle_start_s(*now) - world.cycle_start_s(world.first_controlled_cycle(i));
     let air = world.air_around(*own);
-    let v_m_s = world.segment(own.slot, own.orders).model.v_m_s;
+    let v_m_s = world.known_segment(*own).model.v_m_s;
     let mut from = own.pose.at;
     let mut left_s = 0.0;
     for &to in ahead {

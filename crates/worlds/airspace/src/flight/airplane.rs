@@ -1,6 +1,7 @@
 //! Airplanes as a scenario gives them, and as their group knows them.
 
 use super::change::ChangeAlternatives;
+use super::command::{CommandKinds, LevelCommand, MethodCommand};
 use super::motion::{AircraftModel, Point, Pose2};
 use super::order::{FlightOrder, FlightTask};
 use super::performance::Performance;
@@ -38,6 +39,8 @@ pub struct AirplaneStart {
     pub priority: u8,
     /// The changes of level and speed among which method `pc` chooses for it.
     pub changes: ChangeAlternatives,
+    /// The smallest and the largest airspeed that a method may command of it, in meters per second; none if none does.
+    pub commanded_speeds_m_s: Option<[f64; 2]>,
 }
 
 impl AirplaneStart {
@@ -74,8 +77,46 @@ impl AirplaneStart {
     /// Returns the speeds with which it is planned to fly, in meters per second: that at its start and those of its
     /// orders.
     pub(crate) fn planned_speeds_m_s(&self) -> impl Iterator<Item = f64> {
+        self.filed_speeds_m_s().chain(self.commanded_speeds_m_s.into_iter().flatten())
+    }
+
+    /// Returns the speed at its start and those of its orders, in meters per second.
+    pub(crate) fn filed_speeds_m_s(&self) -> impl Iterator<Item = f64> {
         let ordered = self.orders.iter().filter_map(|order| order.task.speed_m_s());
         ordered.chain([self.model.v_m_s])
+    }
+
+    /// Lets a method command of it what it commands at all, within what it can fly.
+    pub(crate) fn allow_commands(&mut self, kinds: CommandKinds) {
+        let Performance { v_min_m_s, v_max_m_s, .. } = self.performance;
+        let speeds_m_s = kinds
+            .speeds
+            .and_then(|factors| factors.speeds_m_s(self.filed_speeds_m_s(), v_min_m_s..=v_max_m_s));
+        self.commanded_speeds_m_s = speeds_m_s.map(|range| [*range.start(), *range.end()]);
+    }
+
+    /// Lets a method choose among its changes of speed, too.
+    pub(crate) fn allow_changes(&mut self) {
+        let Performance { v_min_m_s, v_max_m_s, .. } = self.performance;
+        for filed_m_s in self.filed_speeds_m_s().collect::<Vec<f64>>() {
+            for change_m_s in &self.changes.speeds_m_s {
+                let v_m_s = (filed_m_s + change_m_s).max(v_min_m_s).min(v_max_m_s);
+                let [from, to] = self.commanded_speeds_m_s.unwrap_or([filed_m_s; 2]);
+                self.commanded_speeds_m_s = Some([from.min(v_m_s), to.max(v_m_s)]);
+            }
+        }
+    }
+
+    /// Returns a command within what it can fly, and what a method may command of it.
+    pub(crate) fn limited_command(&self, command: MethodCommand) -> MethodCommand {
+        let Performance { floor_m, ceiling_m, .. } = self.performance;
+        let level = command.level.map(|level| LevelCommand {
+            altitude_m: level.altitude_m.max(floor_m).min(ceiling_m),
+            ..level
+        });
+        let limits_m_s = self.commanded_speeds_m_s;
+        let v_m_s = command.v_m_s.zip(limits_m_s);
+        MethodCommand { level, v_m_s: v_m_s.map(|(v_m_s, [from, to])| v_m_s.clamp(from, to)) }
     }
 
     /// Returns its model with the turn rate that it can fly at any of its planned speeds.
@@ -123,4 +164,6 @@ pub struct KnownAircraft {
     pub orders: u32,
     /// Altitude in meters.
     pub altitude_m: f64,
+    /// The command of its method that is in force.
+    pub command: MethodCommand,
 }

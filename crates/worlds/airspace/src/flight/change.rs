@@ -1,5 +1,6 @@
 //! Changes of level and speed as parts of actions, and where they lead.
 
+use super::command::{LevelCommand, MethodCommand};
 use super::levels::FlightLevelRange;
 use super::performance::Performance;
 use serde::{Deserialize, Serialize};
@@ -96,9 +97,12 @@ pub(crate) struct ChangeableFlight<'a> {
     pub(crate) altitude_m: f64,
     /// The level of its filed flight in meters.
     pub(crate) filed_altitude_m: f64,
-    /// Its rates of climb and descent in meters per second.
+    /// Its rate of climb in meters per second, and that by its filed flight, 0 if that does not climb.
     pub(crate) climb_m_s: f64,
+    pub(crate) filed_climb_m_s: f64,
+    /// The same for descents.
     pub(crate) descent_m_s: f64,
+    pub(crate) filed_descent_m_s: f64,
     /// Its airspeed in meters per second.
     pub(crate) v_m_s: f64,
     /// The airspeed of its filed flight in meters per second.
@@ -114,8 +118,25 @@ impl ChangeableFlight<'_> {
         let to = (self.filed_altitude_m + change.level_m).max(floor_m).min(ceiling_m);
         // The filed flight stays as it is, also beyond the limits.
         let to = if change.level_m == 0.0 { self.filed_altitude_m } else { to };
-        let rate_s = if to > self.altitude_m { self.climb_m_s } else { self.descent_m_s };
+        let [rate_s, filed_rate_s] = if to > self.altitude_m {
+            [self.climb_m_s, self.filed_climb_m_s]
+        } else {
+            [self.descent_m_s, self.filed_descent_m_s]
+        };
+        // Back to a filed level that its flight plan does not lead to it goes as fast as it left it.
+        let is_filed = change.level_m == 0.0 && filed_rate_s > 0.0;
+        let rate_s = if is_filed { filed_rate_s } else { rate_s };
         SteadyChange { from: self.altitude_m, to, rate_s }
+    }
+
+    /// Returns the command that a change is.
+    pub(crate) fn command(&self, change: FlightChange) -> MethodCommand {
+        let altitudes = self.altitudes(change);
+        let level = LevelCommand { altitude_m: altitudes.to, vertical_m_s: altitudes.rate_s };
+        MethodCommand {
+            level: (change.level_m != 0.0).then_some(level),
+            v_m_s: (change.speed_m_s != 0.0).then(|| self.speeds(change).to),
+        }
     }
 
     /// Returns the airspeeds that it has with a change, within its limits.
@@ -169,7 +190,9 @@ mod tests {
             altitude_m: 1000.0,
             filed_altitude_m: 1000.0,
             climb_m_s: 5.0,
+            filed_climb_m_s: 0.0,
             descent_m_s: 4.0,
+            filed_descent_m_s: 3.0,
             v_m_s: 35.0,
             filed_v_m_s: 35.0,
             performance: &performance,
@@ -179,5 +202,12 @@ mod tests {
         let slower = flight.speeds(FlightChange { level_m: 0.0, speed_m_s: -10.0 });
         assert_eq!((slower.to, slower.rate_s), (33.0, 0.5));
         assert_eq!(flight.altitudes(FlightChange::NONE).to, 1000.0);
+        let above = ChangeableFlight { altitude_m: 1100.0, ..flight };
+        assert_eq!(above.altitudes(FlightChange::NONE).rate_s, 3.0, "as the flight plan descends");
+        let below = ChangeableFlight { altitude_m: 900.0, ..flight };
+        assert_eq!(below.altitudes(FlightChange::NONE).rate_s, 5.0);
+        let command = flight.command(FlightChange { level_m: 100.0, speed_m_s: 0.0 });
+        assert_eq!(command.level.map(|level| level.altitude_m), Some(1100.0));
+        assert_eq!(command.v_m_s, None);
     }
 }

@@ -1,18 +1,22 @@
 //! Segments of a flight: the flight between two orders.
 
 use super::airplane::AirplaneStart;
+use super::command::MethodCommand;
 use super::levels::FlightLevelRange;
 use super::motion::{AircraftModel, Point};
 use super::order::FlightTask;
+use super::performance::Performance;
 use super::surface::FAR_AHEAD_M;
 use sidestep_kernel::math;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The part of a flight between two orders.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct InterOrderSegment<'a> {
-    pub(crate) model: &'a AircraftModel,
+    /// Its abilities; those of a commanded speed are of no order, and owned.
+    pub(crate) model: Cow<'a, AircraftModel>,
     pub(crate) mission: &'a [Point],
     /// Altitude in meters of the level that it keeps or changes to.
     pub(crate) altitude_m: f64,
@@ -33,6 +37,38 @@ impl InterOrderSegment<'_> {
     /// Returns the rate in meters per second at which it changes its level from an altitude in meters.
     pub(crate) fn vertical_m_s(&self, altitude_m: f64) -> f64 {
         if self.altitude_m > altitude_m { self.climb_m_s } else { self.descent_m_s }
+    }
+
+    /// Returns the rate in meters per second at which it climbs from an altitude in meters, negative downward; 0 on its
+    /// level.
+    pub(crate) fn signed_climb_m_s(&self, altitude_m: f64) -> f64 {
+        if altitude_m == self.altitude_m {
+            0.0
+        } else if self.altitude_m > altitude_m {
+            self.climb_m_s
+        } else {
+            -self.descent_m_s
+        }
+    }
+
+    /// Returns the same part of the flight with a command in force over it.
+    #[must_use]
+    pub(crate) fn with_command(
+        mut self,
+        command: &MethodCommand,
+        performance: &Performance,
+    ) -> Self {
+        if let Some(level) = command.level {
+            self.altitude_m = level.altitude_m;
+            self.climb_m_s = level.vertical_m_s.min(performance.climb_max_m_s);
+            self.descent_m_s = level.vertical_m_s.min(performance.descent_max_m_s);
+        }
+        if let Some(v_m_s) = command.v_m_s {
+            let omega_max_rad_s = performance.turn.omega_rad_s(v_m_s);
+            self.model =
+                Cow::Owned(AircraftModel { v_m_s, omega_max_rad_s, ..self.model.into_owned() });
+        }
+        self
     }
 
     /// Returns the levels that it is on in some seconds after `altitude_m`, if nothing holds it.
@@ -57,7 +93,7 @@ impl SegmentAfterOrder {
     pub(crate) fn segment(&self) -> InterOrderSegment<'_> {
         let Self { model, mission, altitude_m, climb_m_s, descent_m_s, .. } = self;
         InterOrderSegment {
-            model,
+            model: Cow::Borrowed(model),
             mission,
             altitude_m: *altitude_m,
             climb_m_s: *climb_m_s,

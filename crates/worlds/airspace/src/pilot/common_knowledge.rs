@@ -4,7 +4,7 @@ use super::percept::{OwnshipState, Percept, SurveillanceReport, TrackedState, pr
 use crate::agents::exchange::{ObservedAircraft, ShieldExchangeSetup};
 use crate::agents::traffic_state::{LastKnownState, OrbitState, StateBeacon, TrafficPicture};
 use crate::agents::{CommonKnowledge, FiledFlight, Ownship};
-use crate::flight::{FlightLevelRange, KnownAircraft, Pose2};
+use crate::flight::{FlightLevelRange, KnownAircraft, MethodCommand, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{CommonPlan, Fallback, OrbitSide, PlanCertainty, ShieldedAircraft};
 use crate::world::AirspaceWorld;
@@ -48,7 +48,7 @@ pub(super) fn ownship(
     let common = common_knowledge(world, percept, unheard);
     let known = percept.own.as_known_aircraft();
     let beacon = beacon(world, known);
-    let mission = world.segment(known.slot, known.orders).mission;
+    let mission = world.known_segment(known).mission;
     let me = percept.own_place();
     Ownship {
         me,
@@ -79,7 +79,7 @@ pub(super) fn filed_flight(world: &AirspaceWorld, id: EntityId) -> FiledFlight {
 
 /// Returns the message in which an airplane describes itself.
 pub(super) fn beacon(world: &AirspaceWorld, known: KnownAircraft) -> StateBeacon {
-    let segment = world.segment(known.slot, known.orders);
+    let segment = world.known_segment(known);
     StateBeacon {
         pose: known.pose,
         goal: segment.mission.get(known.next).copied(),
@@ -103,7 +103,14 @@ fn state_from_flight_plan(world: &AirspaceWorld, id: EntityId) -> LastKnownState
     let pose = world.airplanes[i].start;
     let orbiting = OrbitState { pose, as_of: heard_in, side: world.first_fallbacks[i].orbit_side };
     let altitude_m = world.airplanes[i].altitude_m;
-    let known = KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m };
+    let known = KnownAircraft {
+        slot: id,
+        pose,
+        next: 0,
+        orders: 0,
+        altitude_m,
+        command: MethodCommand::NONE,
+    };
     LastKnownState {
         presumed: Some(orbiting),
         ..LastKnownState::from_beacon(beacon(world, known), heard_in)
@@ -248,6 +255,8 @@ pub(super) fn unheard_as_non_cooperative(
         top_m_s: world.top_m_s[one.id as usize],
         separation_m: segment.model.separation_m,
         error_m: world.bounds.position_m,
+        altitude_m: one.altitude_m,
+        climb_m_s: segment.signed_climb_m_s(one.altitude_m),
         levels: FlightLevelRange::between(one.altitude_m, segment.altitude_m),
         dt_s: world.timing.dt_s,
     }

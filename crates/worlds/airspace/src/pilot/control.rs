@@ -6,6 +6,7 @@ use crate::agents::{ActionChoice, ReachedCost};
 use crate::baseline::mvp::ActiveResolutions;
 use crate::decide::ManeuverCandidates;
 use crate::events::Event;
+use crate::flight::MethodCommand;
 use crate::shield::{CommonPlan, Fallback, ShieldDecision, TurnProfile};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
@@ -73,6 +74,8 @@ pub struct PilotMemory {
     pub contacts: TrafficPicture,
     /// The conflicts that it resolves; empty unless the method is MVP.
     pub resolving: ActiveResolutions,
+    /// What its method has commanded last; nothing unless it commands levels or speeds.
+    pub command: MethodCommand,
 }
 
 impl PilotMemory {

@@ -3,7 +3,7 @@
 use crate::agents::InvalidMessage;
 pub use crate::agents::grouping::{SurveillanceReport, TrackedState};
 use crate::external_action::ExternalAction;
-use crate::flight::{FlightLevelRange, KnownAircraft, Pose2};
+use crate::flight::{FlightLevelRange, KnownAircraft, MethodCommand, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{Fallback, OrbitTracker, ShieldedAircraft, TurnProfile};
 use crate::world::AirspaceWorld;
@@ -59,6 +59,8 @@ pub struct OwnshipState {
     pub next: u32,
     /// Number of orders executed.
     pub orders: u32,
+    /// The command of its method that is in force.
+    pub command: MethodCommand,
     /// Its stored fallback, which it may fly at any time.
     pub fallback: Fallback,
     /// Number of times that the shield has refused its preferred action.
@@ -72,13 +74,13 @@ pub struct OwnshipState {
 impl OwnshipState {
     /// Returns the state that its group knows once it has sent it.
     pub(crate) fn as_known_aircraft(&self) -> KnownAircraft {
-        let &Self { id, seen, next, orders, altitude_m, .. } = self;
-        KnownAircraft { slot: id, pose: seen, next: next as usize, orders, altitude_m }
+        let &Self { id, seen, next, orders, altitude_m, command, .. } = self;
+        KnownAircraft { slot: id, pose: seen, next: next as usize, orders, altitude_m, command }
     }
 
     /// Returns the airplane as the shield knows it in a cycle: where all see it.
     pub(crate) fn shielded_aircraft(&self, world: &AirspaceWorld, now: Cycle) -> ShieldedAircraft {
-        let segment = world.segment(self.id, self.orders);
+        let segment = world.flown_segment(self.id, self.orders, &self.command);
         ShieldedAircraft {
             id: self.id,
             frame: world.surface.frame_at(self.seen.at),
@@ -119,10 +121,10 @@ impl OwnshipState {
         if gust_rad == 0.0 {
             return TurnProfile { omegas_rad_s: vec![omega_rad_s; steps] };
         }
-        let model = world.segment(self.id, self.orders).model;
+        let model = world.flown_segment(self.id, self.orders, &self.command).model;
         let frame = world.surface.fallback_frame(self.orbit_pose, model.v_m_s, omega_rad_s);
         let [pose, orbit_pose] = [self.pose, self.orbit_pose].map(|pose| frame.pose_to_local(pose));
-        let tracker = OrbitTracker::new(pose, orbit_pose, model, omega_rad_s);
+        let tracker = OrbitTracker::new(pose, orbit_pose, &model, omega_rad_s);
         TurnProfile { omegas_rad_s: tracker.turn_rates_rad_s(steps, world.timing.dtau_s, gust_rad) }
     }
 }
@@ -131,7 +133,7 @@ impl OwnshipState {
 /// was refused its preferred maneuver, so that no airplane waits forever. Whole meters in the upper half; the id in the
 /// lower half makes it unique.
 pub(super) fn priority_rank(world: &AirspaceWorld, known: &KnownAircraft, refusals: u32) -> u64 {
-    let segment = world.segment(known.slot, known.orders);
+    let segment = world.known_segment(*known);
     // A percept that came off a network may count more way-points than there are.
     let ahead = &segment.mission[known.next.min(segment.mission.len())..];
     let legs = ahead.iter().scan(known.pose.at, |from, &to| {

@@ -324,7 +324,7 @@ impl Pilot {
             end_tick,
             is_silent,
         };
-        let PilotMemory { contacts, resolving } = &self.memory;
+        let PilotMemory { contacts, resolving, .. } = &self.memory;
         state.phase = match topic {
             Protocol::Shield => {
                 let allowed = allowed_profiles(world, percept, candidates);

@@ -343,6 +343,7 @@ impl Compiler<'_> {
             is_non_cooperative: s.is_non_cooperative(self.source)?,
             priority: s.priority.map_or(0, |priority| priority.get() as u8),
             changes: abilities.changes.clone(),
+            commanded_speeds_m_s: None,
         })
     }
 
@@ -425,5 +426,6 @@ fn replayed_airplane(
         is_non_cooperative,
         priority: 0,
         changes: ChangeAlternatives::default(),
+        commanded_speeds_m_s: None,
     }
 }

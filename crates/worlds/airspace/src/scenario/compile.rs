@@ -4,12 +4,15 @@ use super::detours::DetourRules;
 use super::start_groups::largest_start_group;
 use super::winds::CompiledWind;
 use super::{AirspaceFile, CompiledAirspace, ParsedScenario, Preset};
-use crate::flight::AirplaneStart;
+use crate::baseline::mvp::ResolutionSettings;
+use crate::flight::{AirplaneStart, CommandKinds, SpeedFactors};
 use crate::flight::{FlightLevelRange, MAX_STEPS_PER_DT};
 use crate::flight::{TimeDiscretization, WaypointRule};
 use crate::method::{MethodKind, OwnMethod};
 use crate::perceive::observed_pose;
-use crate::settings::{BuiltInMethod, Deployment, Disturbance, Grouping, ReactiveSettings};
+use crate::settings::{
+    BuiltInMethod, Deployment, Disturbance, Grouping, ReactiveSettings, Resolution,
+};
 use crate::shield::{ErrorBounds, ExemptIds, Fallback, ShieldedAircraft, first_fallbacks};
 use crate::state::AirspaceState;
 use crate::world::AirspaceWorld;
@@ -38,6 +41,14 @@ const MAX_PAIR_STEPS: usize = 100_000_000;
 /// smallest delay; the margin is BlueSky's own.
 const MVP: ReactiveSettings =
     ReactiveSettings { look_ahead_s: 90.0, margin: 1.05, resolution_factor: 1.05 };
+/// MVP by heading alone, and what holds where other resolutions are chosen: the vertical factor as the horizontal one, and
+/// speeds that any airplane can fly.
+const MVP_RESOLUTION: ResolutionSettings = ResolutionSettings {
+    resolution: Resolution::Heading,
+    vertical_factor: 1.05,
+    vertical_lead_s: 0.0,
+    speeds: SpeedFactors { least: 0.8, largest: 1.2 },
+};
 /// Settings with which ORCA loses no separation there, at the smallest delay.
 const ORCA: ReactiveSettings =
     ReactiveSettings { look_ahead_s: 45.0, margin: 1.05, resolution_factor: 1.0 };
@@ -82,6 +93,7 @@ impl<'a> Compiler<'a> {
     pub(super) fn compile(&self) -> Result<CompiledAirspace, InputError> {
         let mut world = self.world()?;
         self.check_deployment(&world)?;
+        self.check_commands(&world)?;
         self.check_action_set_sizes(&world)?;
         self.check_heading_noise(&world)?;
         let (fallbacks, too_close) = if world.shield {
@@ -150,6 +162,13 @@ impl<'a> Compiler<'a> {
         };
         detours.apply(&mut airplanes);
         let mvp = section.mvp.or_default(MVP);
+        let mvp_resolution = section.mvp.resolution_or_default(MVP_RESOLUTION);
+        let commands = self.command_kinds(&method, mvp_resolution);
+        airplanes.iter_mut().for_each(|airplane| airplane.allow_commands(commands));
+        let changes = self.change_kinds(&method, &airplanes);
+        if !changes.is_none() {
+            airplanes.iter_mut().for_each(AirplaneStart::allow_changes);
+        }
         let orca = section.orca.or_default(ORCA);
         let bands = section.bands.or_default(BANDS);
         // The same for all methods that fly the scenario, so that their conflicts can be compared.
@@ -172,6 +191,8 @@ impl<'a> Compiler<'a> {
             legs: self.detour_legs()?,
             method,
             mvp,
+            mvp_resolution,
+            changes,
             orca,
             bands,
             deployment: section.deployment,
@@ -212,6 +233,73 @@ impl<'a> Compiler<'a> {
             None => Arc::new(world.teams_by_action_space()),
         };
         Ok(world)
+    }
+
+    /// Returns the kinds of changes among which a method of the scenario chooses at some time.
+    fn change_kinds(&self, method: &MethodKind, airplanes: &[AirplaneStart]) -> CommandKinds {
+        let later = self.file.airspace.changes.iter().filter_map(|change| change.get_ref().method());
+        let is_used = matches!(method, MethodKind::Pc | MethodKind::External)
+            || later.into_iter().any(|word| word == BuiltInMethod::Pc);
+        if !is_used {
+            return CommandKinds::NONE;
+        }
+        let of_any = |has: fn(&AirplaneStart) -> bool| airplanes.iter().any(has);
+        // Which speeds there are each airplane knows by itself.
+        let as_filed = SpeedFactors { least: 1.0, largest: 1.0 };
+        CommandKinds {
+            levels: of_any(|airplane| !airplane.changes.levels_m.is_empty()),
+            speeds: of_any(|airplane| !airplane.changes.speeds_m_s.is_empty()).then_some(as_filed),
+        }
+    }
+
+    /// Returns what the methods of a scenario may command of airplanes at any time.
+    fn command_kinds(&self, method: &MethodKind, start: ResolutionSettings) -> CommandKinds {
+        let mut kinds = match method {
+            MethodKind::Own(own) => own.command_kinds(),
+            _ => CommandKinds::NONE,
+        };
+        let mut uses_mvp = matches!(method, MethodKind::Mvp);
+        let mut resolution = start;
+        if uses_mvp {
+            kinds = kinds.or(resolution.command_kinds());
+        }
+        for change in &self.file.airspace.changes {
+            let change = change.get_ref();
+            if let Some(word) = change.method() {
+                uses_mvp = word == BuiltInMethod::Mvp;
+            }
+            if let Some(section) = change.mvp() {
+                resolution = section.resolution_or_default(resolution);
+            }
+            if uses_mvp {
+                kinds = kinds.or(resolution.command_kinds());
+            }
+        }
+        kinds
+    }
+
+    /// Refuses methods that command levels or speeds where agents decide, which do not tell each other of these.
+    fn check_commands(&self, world: &AirspaceWorld) -> Result<(), InputError> {
+        if world.command_kinds().is_none() {
+            return Ok(());
+        }
+        let name = world.method.name();
+        if world.deployment != Deployment::Direct {
+            let cause = format!(
+                "method {name} commands levels or speeds, and agents (deployment {}) do not tell each other of these",
+                world.deployment.name()
+            );
+            let remedy = format!("set deployment = \"direct\", or {}", without_commands(world));
+            return Err(self.source.error(None, cause, remedy));
+        }
+        if world.network.is_some() {
+            let cause = format!(
+                "method {name} commands levels or speeds, which nobody sees over a network that loses messages"
+            );
+            let remedy = format!("leave out [airspace.network], or {}", without_commands(world));
+            return Err(self.source.error(None, cause, remedy));
+        }
+        Ok(())
     }
 
     fn method(&self) -> Result<MethodKind, InputError> {
@@ -497,4 +585,13 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Fallback>, Vec<(u32, u32)>)
         fallbacks[i] = fallback;
     }
     (fallbacks, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
+}
+
+/// Returns the remedy that lets a method command neither levels nor speeds.
+fn without_commands(world: &AirspaceWorld) -> &'static str {
+    match world.method {
+        MethodKind::Mvp => "set mvp = { resolution = \"heading\" }",
+        MethodKind::Own(_) => "take a method that commands neither",
+        _ => "leave level_changes_m and speed_changes_m_s out",
+    }
 }

@@ -37,6 +37,12 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     if !is_for_both && section.mvp.is_given() && !uses(|method| matches!(method, MethodKind::Mvp)) {
         note("mvp", "no airplane avoids others by method mvp");
     }
+    for key in section.mvp.effectless_keys(compiled.world.mvp_resolution.resolution) {
+        let because = "airspace.mvp.resolution leaves that as filed";
+        if section.changes.is_empty() {
+            note(&format!("mvp.{key}"), because);
+        }
+    }
     if !is_for_both && section.orca.is_given() && !uses(|method| matches!(method, MethodKind::Orca))
     {
         note("orca", "no airplane avoids others by method orca");
@@ -78,8 +84,12 @@ fn effectless_limits(compiled: &CompiledAirspace) -> Vec<Remark> {
     let keys = compiled.recipe.file.airplane.as_ref().map(ModelSection::abilities);
     let keys = keys.unwrap_or_default();
     let orders = || airplanes.iter().flat_map(|airplane| &airplane.orders);
-    let changes_speed = orders().any(|order| order.task.speed_m_s().is_some());
-    let changes_level = orders().any(|order| matches!(order.task, FlightTask::Altitude { .. }));
+    let rules = || compiled.world.all_rules();
+    let commands_speeds = rules().any(|rules| rules.command_kinds().speeds.is_some());
+    let commands_levels = rules().any(|rules| rules.command_kinds().levels);
+    let changes_speed = commands_speeds || orders().any(|order| order.task.speed_m_s().is_some());
+    let changes_level =
+        commands_levels || orders().any(|order| matches!(order.task, FlightTask::Altitude { .. }));
     let bank_holds = airplanes.iter().all(|airplane| {
         let TurnLimit { omega_max_rad_s, lateral_m_s2 } = airplane.performance.turn;
         airplane.planned_speeds_m_s().all(|v_m_s| lateral_m_s2 / v_m_s < omega_max_rad_s)
@@ -179,6 +189,14 @@ mod tests {
         let mvp = "mvp = { margin = 1.3 }\n";
         assert_eq!(remarks(mvp), ["airspace.mvp"]);
         assert_eq!(remarks(&format!("method = \"mvp\"\n{mvp}")), [""; 0]);
+        let vertical = "method = \"mvp\"\nmvp = { resolution = \"vertical\", resolution_factor = 1.1, vertical_factor = 1.1 }\n";
+        assert_eq!(remarks(vertical), ["airspace.mvp.resolution_factor"]);
+        let heading =
+            "method = \"mvp\"\nmvp = { vertical_factor = 1.1, speed_factors = [0.9, 1.1] }\n";
+        assert_eq!(
+            remarks(heading),
+            ["airspace.mvp.vertical_factor", "airspace.mvp.speed_factors"]
+        );
         assert_eq!(remarks("orca = { look_ahead_s = 20.0 }\n"), ["airspace.orca"]);
         assert_eq!(remarks("bands = { look_ahead_s = 20.0 }\n"), ["airspace.bands"]);
         assert_eq!(remarks("look_every_s = 5.0\n"), ["airspace.look_every_s"]);

@@ -1,9 +1,10 @@
 //! The objective and the settings of the optimizer.
 
 use super::compile::Compiler;
-use crate::flight::DetourAlternatives;
+use crate::baseline::mvp::ResolutionSettings;
+use crate::flight::{DetourAlternatives, SpeedFactors};
 use crate::objective::Objective;
-use crate::settings::{Held, ReactiveSettings};
+use crate::settings::{Held, ReactiveSettings, Resolution};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
@@ -76,15 +77,88 @@ pub(super) struct MvpSection {
     margin: Option<Number<SeparationFactor>>,
     /// Further factor on the zone out of which a conflict is moved (RFACH of BlueSky).
     resolution_factor: Option<Number<ResolutionFactor>>,
+    /// What airplanes change to resolve a conflict (RMETHH and RMETHV of BlueSky).
+    pub(super) resolution: Option<Resolution>,
+    /// Factor on vertical_m out of which a conflict is moved, where levels are changed (RFACV of BlueSky).
+    vertical_factor: Option<Number<ResolutionFactor>>,
+    /// Time before a loss by which levels are apart, where they are changed; 0, as in BlueSky, unless given. With the shield
+    /// about 40 s are needed, because it plans until both of a pair orbit.
+    vertical_lead_s: Option<Number<VerticalLead>>,
+    /// Smallest and largest commanded speed as factors of those that are filed, where speeds are changed; limits of the
+    /// airplane hold, too.
+    speed_factors: Option<SpeedFactorPair>,
 }
 
+/// A smallest and a largest factor on speeds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpeedFactorPair(SpeedFactors);
+
+/// Smallest and largest factor that a scenario may give: an airplane that hardly flies, and one that is faster than any.
+const MIN_SPEED_FACTOR: f64 = 0.1;
+const MAX_SPEED_FACTOR: f64 = 10.0;
+
+impl<'de> Deserialize<'de> for SpeedFactorPair {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let [least, largest] = <[f64; 2]>::deserialize(deserializer)?;
+        if (MIN_SPEED_FACTOR..=1.0).contains(&least) && (1.0..=MAX_SPEED_FACTOR).contains(&largest)
+        {
+            return Ok(Self(SpeedFactors { least, largest }));
+        }
+        let remedy = format!(
+            "give two factors, {MIN_SPEED_FACTOR} to 1 and 1 to {MAX_SPEED_FACTOR}, as [0.8, 1.2]"
+        );
+        Err(invalid_value(format_args!("[{least:?}, {largest:?}]"), &remedy))
+    }
+}
+
+schema_by_hand!(SpeedFactorPair, {
+    let least = json!({ "type": "number", "minimum": MIN_SPEED_FACTOR, "maximum": 1.0 });
+    let largest = json!({ "type": "number", "minimum": 1.0, "maximum": MAX_SPEED_FACTOR });
+    json!({ "type": "array", "prefixItems": [least, largest], "minItems": 2, "maxItems": 2 })
+});
+
+/// A time before a loss.
+type VerticalLead = Closed<0, 100_000>;
 /// A factor on the zone out of which a conflict is moved.
 type ResolutionFactor = LeftOpen<0, 10>;
 
 impl MvpSection {
     /// Returns whether the scenario gives any of them.
     pub(super) fn is_given(&self) -> bool {
-        self.look_ahead_s.is_some() || self.margin.is_some() || self.resolution_factor.is_some()
+        let is_resolution_given = self.resolution_factor.is_some()
+            || self.resolution.is_some()
+            || self.vertical_factor.is_some()
+            || self.vertical_lead_s.is_some()
+            || self.speed_factors.is_some();
+        self.look_ahead_s.is_some() || self.margin.is_some() || is_resolution_given
+    }
+
+    /// Returns the keys that are given and have no effect with some resolution.
+    pub(super) fn effectless_keys(&self, resolution: Resolution) -> Vec<&'static str> {
+        let mut keys = Vec::new();
+        if self.resolution_factor.is_some() && resolution == Resolution::Vertical {
+            keys.push("resolution_factor");
+        }
+        if self.vertical_factor.is_some() && !resolution.changes_level() {
+            keys.push("vertical_factor");
+        }
+        if self.vertical_lead_s.is_some() && !resolution.changes_level() {
+            keys.push("vertical_lead_s");
+        }
+        if self.speed_factors.is_some() && !resolution.changes_speed() {
+            keys.push("speed_factors");
+        }
+        keys
+    }
+
+    /// Returns how conflicts are resolved, as `default` where nothing is given.
+    pub(super) fn resolution_or_default(&self, default: ResolutionSettings) -> ResolutionSettings {
+        ResolutionSettings {
+            resolution: self.resolution.unwrap_or(default.resolution),
+            vertical_factor: self.vertical_factor.map_or(default.vertical_factor, f64::from),
+            vertical_lead_s: self.vertical_lead_s.map_or(default.vertical_lead_s, f64::from),
+            speeds: self.speed_factors.map_or(default.speeds, |pair| pair.0),
+        }
     }
 
     /// Returns the settings, with those of `default` where none are given.

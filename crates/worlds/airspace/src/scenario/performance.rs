@@ -89,6 +89,16 @@ fn speed_mistake(airplane: &AirplaneStart) -> Option<Mistake> {
         };
         return Some((cause, format!("give a v_m_s {}", speed_range(performance))));
     }
+    for change_m_s in &airplane.changes.speeds_m_s {
+        let changed = airplane.filed_speeds_m_s().map(|v_m_s| (v_m_s + change_m_s, v_m_s));
+        if let Some((_, v_m_s)) = changed.into_iter().find(|(changed_m_s, _)| *changed_m_s <= 0.0) {
+            let cause = format!(
+                "an airplane{of_type} that flies at {v_m_s} m/s, with a change of {change_m_s} m/s in speed_changes_m_s"
+            );
+            let remedy = format!("give changes above {} m/s: no airplane stands still in the air", -v_m_s);
+            return Some((cause, remedy));
+        }
+    }
     let omega_rad_s = airplane.least_turning_model().omega_max_rad_s;
     if omega_rad_s < MIN_TURN_RAD_S {
         let cause = format!(

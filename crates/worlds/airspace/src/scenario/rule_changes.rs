@@ -43,6 +43,14 @@ pub(super) struct RuleChangeSection {
 }
 
 impl RuleChangeSection {
+    pub(super) fn method(&self) -> Option<BuiltInMethod> {
+        self.method
+    }
+
+    pub(super) fn mvp(&self) -> Option<&MvpSection> {
+        self.mvp.as_ref()
+    }
+
     fn is_for_all(&self) -> bool {
         self.method.is_some()
             || self.shield.is_some()
@@ -143,6 +151,7 @@ impl Compiler<'_> {
         world.shield &= section.shield.as_ref().is_none_or(|shield| shield.0);
         if let Some(mvp) = &section.mvp {
             world.mvp = mvp.or_default(world.mvp);
+            world.mvp_resolution = mvp.resolution_or_default(world.mvp_resolution);
         }
         if let Some(vertical_m) = section.vertical_m {
             self.set_vertical_m(world, vertical_m.get());

@@ -1,5 +1,6 @@
 //! Snapshots of a state by id, and their digests.
 
+use super::command::AirplaneCommand;
 use super::end::PackedFlightEnd;
 use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
@@ -70,6 +71,8 @@ pub struct Snapshot {
     pub exempt: Vec<(EntityId, EntityId)>,
     /// Each airplane's pose on its stored fallback; empty where no gust takes it off that.
     pub orbit_poses: Vec<Pose2>,
+    /// What the method commands of each airplane; empty unless a method commands levels or speeds.
+    pub commands: Vec<AirplaneCommand>,
     /// The action that a caller has ordered for each airplane; empty unless callers decide.
     pub external_actions: Vec<Option<ExternalAction>>,
     /// Controls of airplanes for the next cycle, if pilots outside of the run have submitted them.
@@ -111,6 +114,11 @@ impl Snapshot {
         }
         if !self.resolving.is_empty() {
             hash_data(&mut hasher, &self.resolving);
+        }
+        // Commands change levels without any order.
+        if !self.commands.is_empty() {
+            self.airplanes.iter().for_each(|a| hasher.write_u64(a.altitude_m.to_bits()));
+            hash_data(&mut hasher, &self.commands);
         }
         // Turn rates do not affect the future, unless a caller outside decides by them.
         if !self.external_actions.is_empty() {

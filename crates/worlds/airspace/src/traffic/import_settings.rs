@@ -2,8 +2,10 @@
 
 use super::flyable_aircraft::aircraft_at_flying_speed;
 use super::{FOOT_M, KNOT_M_S, MVP_LOOK_AHEAD_S, NAUTICAL_MILE_M};
+use crate::settings::Resolution;
 use sidestep_import::bluesky::{
-    AircraftSetting, ResolutionMethod, ScnAircraft, ScnFile, Setting, TimedSetting, Wind,
+    AircraftSetting, HorizontalResolution, ResolutionMethod, ScnAircraft, ScnFile, Setting,
+    TimedSetting, Wind,
 };
 use sidestep_kernel::geometry::{lerp, norm};
 use sidestep_kernel::{InputError, math};
@@ -19,6 +21,9 @@ pub(crate) struct ImportedRules {
     /// nothing about either.
     pub(super) look_ahead_s: Option<f64>,
     pub(super) resolution_factor: Option<f64>,
+    /// What MVP changes; `None` where the file says nothing about that.
+    pub(super) resolution: Option<Resolution>,
+    pub(super) vertical_factor: Option<f64>,
     pub(super) wind: Option<ImportedWind>,
     pub(super) separation_m: f64,
     pub(super) vertical_m: f64,
@@ -74,6 +79,8 @@ struct SettingsInForce {
     resolution: Option<ResolutionMethod>,
     look_ahead_s: Option<f64>,
     resolution_factor: Option<f64>,
+    limits: Option<ResolutionLimits>,
+    vertical_factor: Option<f64>,
     radius_nm: f64,
     half_height_ft: f64,
     winds: Vec<Wind>,
@@ -86,9 +93,52 @@ impl Default for SettingsInForce {
             resolution: None,
             look_ahead_s: None,
             resolution_factor: None,
+            limits: None,
+            vertical_factor: None,
             radius_nm: 5.0,
             half_height_ft: 1000.0,
             winds: Vec::new(),
+        }
+    }
+}
+
+/// What MVP may change, as BlueSky keeps it: each command of one direction may undo one of the other.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct ResolutionLimits {
+    heading: bool,
+    speed: bool,
+    vertical: bool,
+}
+
+impl ResolutionLimits {
+    /// BlueSky's own: in the horizontal.
+    const AT_START: Self = Self { heading: true, speed: true, vertical: false };
+
+    fn with_horizontal(self, resolution: HorizontalResolution) -> Self {
+        match resolution {
+            HorizontalResolution::Both => Self::AT_START,
+            HorizontalResolution::Speed => Self { heading: false, ..Self::AT_START },
+            HorizontalResolution::Heading => Self { speed: false, ..Self::AT_START },
+            HorizontalResolution::Off => Self { heading: false, speed: false, ..self },
+        }
+    }
+
+    fn with_vertical(self, is_on: bool) -> Self {
+        if is_on {
+            Self { heading: false, speed: false, vertical: true }
+        } else {
+            Self { vertical: false, ..self }
+        }
+    }
+
+    fn resolution(self) -> Resolution {
+        match (self.heading, self.speed, self.vertical) {
+            (true, false, _) => Resolution::Heading,
+            (false, true, _) => Resolution::Speed,
+            (true, true, _) => Resolution::HeadingSpeed,
+            (false, false, true) => Resolution::Vertical,
+            // Without any limit BlueSky changes everything.
+            (false, false, false) => Resolution::HeadingSpeedVertical,
         }
     }
 }
@@ -286,8 +336,15 @@ impl ImportedRules {
         let default = is_chosen.then_some(DEFAULT_RESOLUTION_FACTOR);
         let factor = self.resolution_factor.or(default);
         let factor = factor.map(|factor| format!("resolution_factor = {factor:?}"));
-        let keys: Vec<String> = look_ahead.into_iter().chain(margin).chain(factor).collect();
-        keys.join(", ")
+        let resolution = self.resolution.filter(|_| is_chosen);
+        let words = resolution.map(|resolution| format!("resolution = \"{}\"", resolution.name()));
+        let changes_level = resolution.is_some_and(Resolution::changes_level);
+        let vertical_factor = self.vertical_factor.unwrap_or(DEFAULT_RESOLUTION_FACTOR);
+        let vertical = changes_level.then(|| format!("vertical_factor = {vertical_factor:?}"));
+        let changes_horizontal = resolution != Some(Resolution::Vertical);
+        let factor = factor.filter(|_| changes_horizontal);
+        let keys = [look_ahead, margin, factor, words, vertical];
+        keys.into_iter().flatten().collect::<Vec<String>>().join(", ")
     }
 }
 
@@ -313,6 +370,22 @@ impl SettingsReader<'_> {
                 self.now.resolution_factor = Some(factor);
             }
             Setting::ResolutionFactor(factor) => {
+                self.refuse(timed, format!("a factor of {factor}"), "give 0.5 to 10");
+            }
+            Setting::HorizontalResolution(resolution) => {
+                let limits = self.now.limits.unwrap_or(ResolutionLimits::AT_START);
+                self.now.limits = Some(limits.with_horizontal(resolution));
+            }
+            // Off without anything before it is how BlueSky begins.
+            Setting::VerticalResolution(false) if self.now.limits.is_none() => {}
+            Setting::VerticalResolution(is_on) => {
+                let limits = self.now.limits.unwrap_or(ResolutionLimits::AT_START);
+                self.now.limits = Some(limits.with_vertical(is_on));
+            }
+            Setting::VerticalResolutionFactor(factor) if (0.5..=10.0).contains(&factor) => {
+                self.now.vertical_factor = Some(factor);
+            }
+            Setting::VerticalResolutionFactor(factor) => {
                 self.refuse(timed, format!("a factor of {factor}"), "give 0.5 to 10");
             }
             Setting::LookAheadS(s) if (MIN_LOOK_AHEAD_S..=MAX_LOOK_AHEAD_S).contains(&s) => {
@@ -358,6 +431,8 @@ impl SettingsReader<'_> {
             is_bare,
             look_ahead_s,
             resolution_factor: self.now.resolution_factor,
+            resolution: self.now.limits.map(ResolutionLimits::resolution),
+            vertical_factor: self.now.vertical_factor,
             wind,
             separation_m: self.now.radius_nm * NAUTICAL_MILE_M,
             vertical_m: self.now.half_height_ft * FOOT_M,
@@ -465,6 +540,32 @@ mod tests {
     }
 
     #[test]
+    fn resolutions_are_those_that_bluesky_comes_to_by_the_same_commands() {
+        for (commands, keys) in [
+            ("RESO MVP\nRMETHV OFF", None),
+            ("RESO MVP\nRMETHH HDG", Some("heading")),
+            ("RESO MVP\nRMETHH SPD", Some("speed")),
+            ("RESO MVP\nRMETHH ON", Some("heading-speed")),
+            ("RESO MVP\nRMETHH HDG\nRMETHV V/S", Some("vertical")),
+            ("RESO MVP\nRMETHV V/S\nRMETHH OFF", Some("vertical")),
+            ("RESO MVP\nRMETHV V/S\nRMETHH SPD", Some("speed")),
+            ("RESO MVP\nRMETHH OFF", Some("heading-speed-vertical")),
+            ("RESO MVP\nRMETHV V/S\nRMETHV OFF", Some("heading-speed-vertical")),
+        ] {
+            let (settings, refused) = found(commands);
+            assert_eq!(refused, [""; 0], "{commands}");
+            let resolution = settings.start.resolution.map(Resolution::name);
+            assert_eq!(resolution, keys, "{commands}");
+        }
+        let (settings, _) = found("RESO MVP\nRMETHV V/S\nRFACV 1.2");
+        let keys =
+            "look_ahead_s = 300.0, margin = 1.0, resolution = \"vertical\", vertical_factor = 1.2";
+        assert_eq!(settings.start.mvp_text(), keys);
+        let (settings, _) = found("RMETHV V/S");
+        assert_eq!(settings.start.mvp_text(), "", "as long as nothing is resolved");
+    }
+
+    #[test]
     fn a_setting_holds_from_its_time_on_and_not_before() {
         for (timed, method, changes) in [
             (
@@ -522,6 +623,7 @@ mod tests {
             ("NOISE ON", "NOISE", 2),
             ("DTLOOK 0.5", "DTLOOK", 2),
             ("RFACH 20", "RFACH", 2),
+            ("RFACV 20", "RFACV", 2),
             ("WIND 0,1,,270,36\nWIND 0,2,,90,36", "WIND", 3),
             ("WIND 0,1,,270,600", "WIND", 2),
         ] {

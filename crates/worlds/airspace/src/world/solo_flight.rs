@@ -81,8 +81,8 @@ impl SoloFlight<'_> {
         let frame = world.surface.frame_at(self.pose.at);
         let pose = frame.pose_to_local(self.pose);
         let route = RoutePosition { mission, next: self.next, pose };
-        let mission = air.local_mission(frame, model, route, world.timing.dtau_s);
-        let straight = air.straight_step_count(&air.autopilot(model, &mission), pose, self.next);
+        let mission = air.local_mission(frame, &model, route, world.timing.dtau_s);
+        let straight = air.straight_step_count(&air.autopilot(&model, &mission), pose, self.next);
         let after = air.after_straight_steps(pose, model.v_m_s, straight);
         if let Some(measures) = world.measures.flights {
             let flown_s = straight as f64 * world.timing.dtau_s;
@@ -115,7 +115,7 @@ impl SoloFlight<'_> {
     fn step(&mut self) {
         let Self { world, air, .. } = *self;
         let segment = world.segment(self.slot, self.orders);
-        let InterOrderSegment { model, mission, .. } = segment;
+        let InterOrderSegment { model, mission, .. } = &segment;
         let has_no_orders =
             self.airplane.orders.is_empty() && self.airplane.leaves_s == f64::INFINITY;
         let is_same_wind = world.wind_field.as_ref().is_none_or(|field| !field.varies_by_place());
@@ -127,8 +127,8 @@ impl SoloFlight<'_> {
         let frame = world.surface.frame_at(self.pose.at);
         let before = frame.pose_to_local(self.pose);
         let route = RoutePosition { mission, next: self.next, pose: before };
-        let mission = air.local_mission(frame, model, route, world.timing.dtau_s);
-        let pilot = air.autopilot(model, &mission);
+        let mission = air.local_mission(frame, &model, route, world.timing.dtau_s);
+        let pilot = air.autopilot(&model, &mission);
         let omega = air.steer(&pilot, before, self.next);
         let after = air.after_wind_step(before.step(model.v_m_s, omega, world.timing.dtau_s));
         let next = pilot.next_way_point((before, after), self.next);

@@ -2,7 +2,7 @@
 
 use crate::agents::intent::Intent;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::{KnownAircraft, Pose2};
+use crate::flight::{KnownAircraft, MethodCommand, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{Fallback, OrbitSide};
 use serde::{Deserialize, Serialize};
@@ -40,7 +40,14 @@ impl SurveillanceReport {
     /// Returns the knowledge of it before it has sent anything: its filed flight, where it is seen.
     pub(crate) fn as_known_aircraft(&self) -> KnownAircraft {
         let &Self { id, pose, altitude_m, .. } = self;
-        KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m }
+        KnownAircraft {
+            slot: id,
+            pose,
+            next: 0,
+            orders: 0,
+            altitude_m,
+            command: MethodCommand::NONE,
+        }
     }
 
     /// Returns the knowledge of it of those that have watched its flight.
@@ -52,7 +59,15 @@ impl SurveillanceReport {
     /// Returns the knowledge of it once it has sent its intentions.
     pub(crate) fn with_intent(&self, intent: &Intent) -> KnownAircraft {
         let &Intent { next, orders, altitude_m, .. } = intent;
-        KnownAircraft { slot: self.id, pose: self.pose, next: next as usize, orders, altitude_m }
+        KnownAircraft {
+            slot: self.id,
+            pose: self.pose,
+            next: next as usize,
+            orders,
+            altitude_m,
+            // Deployments by agents are refused with methods that command anything.
+            command: MethodCommand::NONE,
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use crate::agents::intent::Intent;
 use crate::agents::packet::Protocol;
 use crate::agents::traffic_state::{TrafficPicture, record_beacon};
 use crate::agents::{ConversationEnd, OptimizationResult};
+use crate::baseline::ReactiveMemory;
 use crate::decide::{
     DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_velocity,
     candidates_from_choice, decide_by_predictions,
@@ -221,13 +222,14 @@ impl Pilot {
                 me = group.len();
             }
             group.push(one.with_intent(intent));
-            memory.push(intent.resolving.clone());
+            let resolving = intent.resolving.clone();
+            memory.push(ReactiveMemory { resolving, ..ReactiveMemory::default() });
         }
         let now = state.percept.cycle;
         let mut all =
             candidates_by_velocity(&self.world, &group, &non_cooperative, &mut memory, now);
         if self.world.has_resolution_memory() {
-            self.memory.resolving = memory.swap_remove(me);
+            self.memory.resolving = memory.swap_remove(me).resolving;
         }
         self.set_candidates(all.swap_remove(me));
     }
