@@ -8,6 +8,8 @@ mod local_flight;
 #[cfg(test)]
 mod optima_tests;
 mod preferences;
+#[cfg(test)]
+mod tuple_tests;
 mod velocity;
 
 use super::agents::network_traffic::NetworkTraffic;

@@ -8,15 +8,15 @@ use super::areas::{AreaContext, Areas, LocalAreas};
 use super::baseline::mvp::{MvpRules, ResolutionSettings};
 use super::flight::{
     Action, AirplaneStart, ChangeableFlight, Chart, CommandKinds, DetourAlternatives, DoneOrders,
-    FlightChange, FlightConditions, FlightLevelRange, FlightPhase, Gusts, InterOrderSegment, KnownAircraft,
-    MethodCommand, Point, Pose2, RoutePosition, SegmentAfterOrder, Surface, TimeDiscretization, Track,
-    WaypointRule, WindField,
-    actions, actions_at_turn_rate, segments_after_orders,
+    FlightChange, FlightConditions, FlightLevelRange, FlightPhase, Gusts, InterOrderSegment,
+    KnownAircraft, MethodCommand, Point, Pose2, RoutePosition, SegmentAfterOrder, Surface,
+    TimeDiscretization, Track, WaypointRule, WindField, actions, actions_at_turn_rate,
+    segments_after_orders,
 };
+use super::flight_plan::CLIMB_M_S;
 use super::measures::{FlightEffort, MeasureSettings};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
-use super::flight_plan::CLIMB_M_S;
 use super::objective::{ActionChanges, ActionPredictions, Objective};
 use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings, RightOfWayRule};
 use super::shield::{

@@ -237,7 +237,8 @@ impl<'a> Compiler<'a> {
 
     /// Returns the kinds of changes among which a method of the scenario chooses at some time.
     fn change_kinds(&self, method: &MethodKind, airplanes: &[AirplaneStart]) -> CommandKinds {
-        let later = self.file.airspace.changes.iter().filter_map(|change| change.get_ref().method());
+        let later =
+            self.file.airspace.changes.iter().filter_map(|change| change.get_ref().method());
         let is_used = matches!(method, MethodKind::Pc | MethodKind::External)
             || later.into_iter().any(|word| word == BuiltInMethod::Pc);
         if !is_used {

@@ -95,7 +95,8 @@ fn speed_mistake(airplane: &AirplaneStart) -> Option<Mistake> {
             let cause = format!(
                 "an airplane{of_type} that flies at {v_m_s} m/s, with a change of {change_m_s} m/s in speed_changes_m_s"
             );
-            let remedy = format!("give changes above {} m/s: no airplane stands still in the air", -v_m_s);
+            let remedy =
+                format!("give changes above {} m/s: no airplane stands still in the air", -v_m_s);
             return Some((cause, remedy));
         }
     }
