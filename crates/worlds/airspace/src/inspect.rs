@@ -106,6 +106,9 @@ impl Inspector<'_> {
     fn add_state_section(&self, inspection: &mut Inspection) {
         let current = &self.before.airplanes[self.id as usize];
         let segment = self.before.segment(self.world, self.id);
+        let command = self.before.command_in_force(self.id);
+        let commanded_level = command.level.map(|level| FactValue::meters(level.altitude_m));
+        let commanded_speed = command.v_m_s.map(|v_m_s| FactValue::number(v_m_s, "m/s"));
         let avoids = if self.world.is_replayed(self.id, self.now) {
             "nobody: it follows its track"
         } else if self.world.is_non_cooperative(self.id, self.now) {
@@ -122,6 +125,8 @@ impl Inspector<'_> {
                 .fact("heading", FactValue::degrees(current.pose().heading_rad))
                 .fact_if("type", performance.type_name.clone())
                 .fact("airspeed", FactValue::number(segment.model.v_m_s, "m/s"))
+                .fact_if("commanded airspeed", commanded_speed)
+                .fact_if("commanded level", commanded_level)
                 .fact("separation", FactValue::meters(segment.model.separation_m))
                 .fact(
                     "way-points left",

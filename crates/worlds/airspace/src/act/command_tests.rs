@@ -206,11 +206,12 @@ fn a_command_overlays_the_filed_flight_until_it_is_given_back() {
     let mut run = run_own(For { command, cycles: 10 }, "", &alone);
     // It is in force from the cycle after the first decision on.
     let expected = [(1, 35.0, 0.0), (2, 37.0, 20.0), (3, 38.0, 40.0), (6, 38.0, 100.0)];
-    let given_back = [(11, 38.0, 100.0), (12, 36.0, 80.0), (13, 35.0, 60.0), (17, 35.0, 0.0)];
+    let given_back = [(11, 38.0, 100.0), (12, 36.0, 61.9), (13, 35.0, 23.8), (15, 35.0, 0.0)];
     for (cycle, v_m_s, altitude_m) in expected.into_iter().chain(given_back) {
         run.advance(cycle - run.cycle());
         let found = speed_and_level(&run, 0);
-        assert_eq!((found.v_m_s, found.altitude_m), (v_m_s, altitude_m), "{cycle}");
+        assert_eq!(found.v_m_s, v_m_s, "{cycle}");
+        assert!((found.altitude_m - altitude_m).abs() < 1e-9, "{cycle} {}", found.altitude_m);
     }
     run.advance(1);
     assert!(run.state().command_in_force(0).is_none());

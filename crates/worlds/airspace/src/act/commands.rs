@@ -8,6 +8,7 @@
 use super::orders::fallback_at_speed;
 use crate::events::{Event, EventKind};
 use crate::flight::{InterOrderSegment, LevelCommand, MethodCommand};
+use crate::flight_plan::CLIMB_M_S;
 use crate::scratch::PhaseContext;
 use crate::state::AirplaneCommand;
 use sidestep_kernel::EntitySlot;
@@ -75,7 +76,8 @@ fn carry_out_level(
 }
 
 /// Returns the command by which an airplane goes back to its filed level, if it is not there and its flight plan does
-/// not lead there: the rate is that of the command that is given back.
+/// not lead there: as by an order without a rate, as far as it can fly that. The rate of the command that is given back
+/// may be next to nothing.
 fn level_back(
     filed: &InterOrderSegment<'_>,
     altitude_m: f64,
@@ -85,7 +87,7 @@ fn level_back(
     let is_there = altitude_m == filed.altitude_m;
     given_back
         .filter(|_| !is_there && !is_led_back)
-        .map(|level| LevelCommand { altitude_m: filed.altitude_m, ..level })
+        .map(|_| LevelCommand { altitude_m: filed.altitude_m, vertical_m_s: CLIMB_M_S })
 }
 
 /// Changes the speed toward the commanded one, or back to the filed one, by at most as much as the airplane accelerates

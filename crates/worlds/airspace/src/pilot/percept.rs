@@ -153,7 +153,7 @@ impl Percept {
     /// When it is not.
     pub fn check(&self, world: &AirspaceWorld) -> Result<(), InvalidMessage> {
         let n = world.airplanes.len();
-        let OwnshipState { id, orders, ref exempt, altitude_m, levels, .. } = self.own;
+        let OwnshipState { id, orders, ref exempt, altitude_m, levels, command, .. } = self.own;
         let others = self.non_cooperative.iter().map(|one| one.slot).chain(exempt.iter().copied());
         let are_known = self.members().into_iter().chain(others).all(|id| (id as usize) < n);
         let is_ascending = self.group.windows(2).all(|pair| pair[0].id < pair[1].id);
@@ -161,6 +161,8 @@ impl Percept {
         InvalidMessage::Airplane.ensure(are_known && is_ascending && is_member)?;
         InvalidMessage::Plan
             .ensure(orders as usize <= world.airplanes[id as usize].orders.len())?;
+        // Pilots are refused where a method commands anything.
+        InvalidMessage::Plan.ensure(command.is_none())?;
         let has_levels = levels.low_m <= altitude_m && altitude_m <= levels.high_m;
         InvalidMessage::Number
             .ensure(has_levels && levels.high_m - levels.low_m < f64::INFINITY)?;
