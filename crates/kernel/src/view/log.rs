@@ -153,6 +153,14 @@ log_event_kinds! {
     AreaExempt = "area-exempt",
     /// The shield has not cleared a level or a speed that a method commands.
     CommandHeld = "command-held",
+    /// Two bodies come too close as far as a search has found, and it has come to its limit.
+    SearchLimit = "search-limit",
+    /// The shield holds a change of level of a body; the value is its altitude.
+    LevelOff = "level-off",
+    /// The shield holds a body below the altitude that is safe; the value is its altitude.
+    LowHold = "low-hold",
+    /// A body is in the air for longer than its fuel lasts; the value is how long that lasts.
+    EnduranceExceedance = "endurance-exceedance",
 }
 
 /// The severity of an event, rising.

@@ -20,6 +20,7 @@ mod direct;
 mod entry;
 mod errors;
 mod flight;
+mod holds;
 mod levels;
 mod orders;
 #[cfg(test)]
@@ -66,6 +67,7 @@ fn fly(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
     let flown = prepare_decisions(context, group);
     let non_cooperative = non_cooperative_aircraft(context, group);
     let mut profiles = decide_flown_profiles(context, &flown, &non_cooperative).into_iter();
+    holds::report_holds(context, &flown.ids);
     let flights = group.iter().map(|&slot| {
         let maneuver = match &world.airplanes[slot as usize].track {
             Some(track) if world.is_replayed(slot, now) => FlightPathSource::Track(track),
@@ -102,7 +104,7 @@ pub(super) fn prepare_decisions(
     levels::keep_levels(context, group);
     if context.world.shield {
         entry::release_exempt(context, &flown.ids);
-        entry::assign_fallbacks(context, &flown.ids);
+        entry::assign_fallbacks(context, &flown.ids, flown.ids.len() < group.len());
         entry::renew_fallbacks(context, &flown.ids);
         areas::report_exempt_areas(context, &flown.ids);
         errors::report_beyond_bound(context, &flown.ids);

@@ -42,6 +42,16 @@ pub enum EventKind {
     AreaExempt,
     /// The shield has not cleared what a method commands: the airplane keeps its speed, or levels off short of a level.
     CommandHeld,
+    /// Two airplanes are named as too close, and the search for fallbacks that keep all apart has come to its limit: there
+    /// may be some.
+    SearchLimit,
+    /// The shield begins to hold a change of level of an airplane; the value is its altitude in meters.
+    LevelOff,
+    /// The shield begins to hold an airplane, on its fallback or off its level, below the safe altitude; the value is its
+    /// altitude in meters.
+    LowHold,
+    /// An airplane is in the air for longer than its endurance; the value is its endurance in seconds.
+    EnduranceExceedance,
 }
 
 /// The quantity that the value of an event measures: each has a column of its own in the table.
@@ -76,18 +86,22 @@ impl EventKind {
             | Self::GroupTooLarge
             | Self::BeyondBound
             | Self::AreaEntry
-            | Self::AreaExempt => Some(EventQuantity::Number),
+            | Self::AreaExempt
+            | Self::LevelOff
+            | Self::LowHold
+            | Self::EnduranceExceedance => Some(EventQuantity::Number),
             Self::Orbit
             | Self::Unheard
             | Self::Deadline
             | Self::HeldBack
             | Self::Absent
-            | Self::CommandHeld => None,
+            | Self::CommandHeld
+            | Self::SearchLimit => None,
         }
     }
 
     /// All kinds; the table of events stores places in this list.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 18] = [
         Self::LossOfSeparation,
         Self::Arrival,
         Self::Override,
@@ -102,6 +116,10 @@ impl EventKind {
         Self::AreaEntry,
         Self::AreaExempt,
         Self::CommandHeld,
+        Self::SearchLimit,
+        Self::LevelOff,
+        Self::LowHold,
+        Self::EnduranceExceedance,
     ];
 
     /// Returns the kind that it is for viewers, which know no world.
@@ -121,6 +139,10 @@ impl EventKind {
             Self::AreaEntry => LogEventKind::AreaEntry,
             Self::AreaExempt => LogEventKind::AreaExempt,
             Self::CommandHeld => LogEventKind::CommandHeld,
+            Self::SearchLimit => LogEventKind::SearchLimit,
+            Self::LevelOff => LogEventKind::LevelOff,
+            Self::LowHold => LogEventKind::LowHold,
+            Self::EnduranceExceedance => LogEventKind::EnduranceExceedance,
         }
     }
 
@@ -141,6 +163,10 @@ impl EventKind {
             Self::AreaEntry => "area-entry",
             Self::AreaExempt => "area-exempt",
             Self::CommandHeld => "command-held",
+            Self::SearchLimit => "search-limit",
+            Self::LevelOff => "level-off",
+            Self::LowHold => "low-hold",
+            Self::EnduranceExceedance => "endurance-exceedance",
         }
     }
 }

@@ -10,7 +10,7 @@ use super::flight::{
     coordinates_from_degrees,
 };
 use super::settings::{
-    AbilityKeys, AltitudeLimit, Bank, ChangeList, PositiveRate, SeparationM, Speed, SpeedLimit,
+    AbilityKeys, AltitudeLimit, Bank, ChangeList, PositiveRate, PositiveTime, SeparationM, Speed, SpeedLimit,
     TurnCount, TurnRate, ability_keys,
 };
 use limits::{LevelChange, Mistake, level_order_mistake, speed_order_mistake};
@@ -76,6 +76,8 @@ pub(super) struct AirplaneSection {
     pub(super) ceiling_m: Option<AltitudeLimit>,
     /// Greatest change of airspeed; without it speeds change at once.
     pub(super) acceleration_m_s2: Option<PositiveRate>,
+    /// Time for which its fuel, or its battery, lasts; a longer flight is reported.
+    pub(super) endurance_s: Option<PositiveTime>,
     /// Distance that others have to keep, if not that of all.
     pub(super) separation_m: Option<SeparationM>,
     /// Number of turn rates to choose from, if not that of all.

@@ -1,4 +1,6 @@
-//! Generated traffic: the super-conflict, random crossings, and converging streams.
+//! Generated traffic: the super-conflict, random crossings, converging streams, and terminal areas.
+
+mod terminal;
 
 use super::flight::{
     AircraftModel, AirplaneStart, ChangeAlternatives, Performance, Point, Pose2, distance_m,
@@ -10,6 +12,7 @@ use sidestep_kernel::stream::{Draws, Streams};
 use sidestep_kernel::{interrupt, math};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+pub(super) use terminal::TerminalParams;
 
 /// Largest number of draws, per airplane, for a start far enough from all others.
 const MAX_TRIES: usize = 2_000;
@@ -24,12 +27,23 @@ pub(crate) enum GeneratorKind {
     Random,
     /// Three streams that meet.
     Streams,
+    /// Departures from a runway, arrivals to the same field, and overflights, all of which change their level.
+    Terminal,
+}
+
+/// The traffic to generate, with the settings that only its kind has.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum TrafficKind {
+    Superconflict,
+    Random,
+    Streams,
+    Terminal(TerminalParams),
 }
 
 /// Parameters of the traffic to generate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct GeneratorParams<'a> {
-    pub(super) kind: GeneratorKind,
+    pub(super) kind: TrafficKind,
     pub(super) n: usize,
     pub(super) radius_m: f64,
     pub(super) jitter_m: f64,
@@ -45,10 +59,11 @@ pub(super) fn generate(
     params: &GeneratorParams<'_>,
     streams: &Streams,
 ) -> Result<Vec<AirplaneStart>, usize> {
-    match params.kind {
-        GeneratorKind::Superconflict => Ok(superconflict(params, streams)),
-        GeneratorKind::Random => random_traffic(params, streams),
-        GeneratorKind::Streams => Ok(converging_streams(params, streams)),
+    match &params.kind {
+        TrafficKind::Superconflict => Ok(superconflict(params, streams)),
+        TrafficKind::Random => random_traffic(params, streams),
+        TrafficKind::Streams => Ok(converging_streams(params, streams)),
+        TrafficKind::Terminal(terminal) => terminal::terminal_traffic(params, terminal, streams),
     }
 }
 

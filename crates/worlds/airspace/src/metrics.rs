@@ -64,6 +64,13 @@ impl Counters {
         *first = now.min(*first);
     }
 
+    /// Counts pairs of the start that are too close as far as the search of their fallbacks has come.
+    pub(super) fn add_unproved_pairs(&mut self, pairs: u64) {
+        if pairs > 0 {
+            *self.events.entry(EventKind::SearchLimit).or_default() += pairs;
+        }
+    }
+
     pub(super) fn add_area(&mut self, key: (EntityId, u32), record: AreaRecord) {
         self.areas.entry(key).or_default().add(record);
     }
@@ -214,6 +221,13 @@ metrics! {
         pub shield_overrides: u64 => "wishes changed by the shield",
         /// Wishes changed by the shield for the stored fallback, for one `dt`.
         pub shield_orbits: u64 => "times on the stored fallback",
+        /// Times that the shield held a change of level, for one `dt`.
+        pub shield_level_offs: u64 => "times held on the way to a level",
+        /// Holds by the shield, on a fallback or on the way to a level, of an airplane below `airspace.safe_altitude_m`; none
+        /// without that.
+        pub low_holds: Option<u64> => "holds below the safe altitude",
+        /// Airplanes that were in the air for longer than their endurance; none where that is given for none.
+        pub endurance_exceedances: Option<u64> => "airplanes beyond their endurance",
         /// Wishes changed because not all others had agreed in time.
         pub shield_held_back: u64 => "wishes held back for lack of agreement",
         /// Times that the shield did not clear a level or a speed that a method commands: the airplane kept its speed for one
@@ -233,9 +247,11 @@ metrics! {
         pub replayed: u64 => "airplanes replayed to the end",
         /// Orders carried out.
         pub orders: u64 => "orders carried out",
-        /// Times that an order waited for the next `dt`, or held a change of level. It waits while no orbit is apart from
-        /// those of others.
+        /// Times that an order waited for the next `dt`. It waits while no orbit is apart from those of others.
         pub orders_delayed: u64 => "orders delayed",
+        /// Pairs that came in too close as far as was searched: the search for fallbacks that keep all apart has come to its
+        /// limit. Of all others in `too_close` it is certain that there are none.
+        pub unproved_pairs: u64 => "pairs too close without a proof",
         /// Pairs for which the shield promises nothing, and since when.
         pub too_close: Vec<UnprotectedPair> => "pairs without a promise",
         /// Airplanes that the shield does not keep clear of an area, and since when.
@@ -319,8 +335,10 @@ metrics! {
         pub left: bool,
         /// Number of orders carried out.
         pub orders: u16,
-        /// Number of times that an order had to wait for the next `dt`, or held a change of level.
+        /// Number of times that an order had to wait for the next `dt`.
         pub orders_delayed: u16,
+        /// Number of times that the shield held a change of level, for one `dt`.
+        pub shield_level_offs: u32,
     }
 }
 
@@ -367,6 +385,7 @@ pub fn airplane_metrics(
         // One that avoids nobody is never delayed.
         .filter(|_| !world.airplanes[id as usize].is_non_cooperative)
         .map(|s| 100.0 * (s - alone_s) / alone_s);
+    let level_offs = state.hold(id).map_or(0, |hold| hold.level_offs);
     let effort = state.effort(id);
     let alone = &world.alone_efforts[id as usize];
     let ended_effort = effort.filter(|_| delay_percent.is_some());
@@ -387,7 +406,8 @@ pub fn airplane_metrics(
         shield_orbits: airplane.orbits.get(),
         left: airplane.has_left(),
         orders: world.airplanes[id as usize].whole_orders(airplane.orders.get()),
-        orders_delayed: airplane.waits.get(),
+        orders_delayed: airplane.waits.get().saturating_sub(level_offs.min(u16::MAX.into()) as u16),
+        shield_level_offs: level_offs,
     }
 }
 
@@ -599,6 +619,10 @@ pub(crate) fn metrics(
         optimize_cpu_s: decide_s,
         shield_overrides: all.iter().map(|a| u64::from(a.shield_overrides)).sum(),
         shield_orbits: all.iter().map(|a| u64::from(a.shield_orbits)).sum(),
+        shield_level_offs: all.iter().map(|a| u64::from(a.shield_level_offs)).sum(),
+        low_holds: world.safe_altitude_m.map(|_| counters.event_count(EventKind::LowHold)),
+        endurance_exceedances: has_endurance(world)
+            .then(|| counters.event_count(EventKind::EnduranceExceedance)),
         shield_held_back: counters.event_count(EventKind::HeldBack),
         commands_held: world.has_commands().then(|| counters.event_count(EventKind::CommandHeld)),
         contacts_lost: counters.event_count(EventKind::Unheard),
@@ -609,10 +633,15 @@ pub(crate) fn metrics(
         replayed: replayed_count(world, state),
         orders: all.iter().map(|a| u64::from(a.orders)).sum(),
         orders_delayed: all.iter().map(|a| u64::from(a.orders_delayed)).sum(),
+        unproved_pairs: counters.event_count(EventKind::SearchLimit),
         too_close: unprotected_pairs(world, counters),
         exempt_areas: area_exemptions(world, counters),
         beyond_bound: error_bound_violations(world, counters),
     }
+}
+
+fn has_endurance(world: &AirspaceWorld) -> bool {
+    world.airplanes.iter().any(|airplane| airplane.performance.endurance_s < f64::INFINITY)
 }
 
 /// Returns the time that conversations took on the network, in seconds; none where that is reliable.

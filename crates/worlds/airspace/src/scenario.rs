@@ -6,6 +6,7 @@ mod compile;
 mod detours;
 mod earth;
 mod effectless;
+mod generator;
 mod gusts;
 mod measures;
 mod network;
@@ -21,16 +22,17 @@ use super::flight::AirplaneStart;
 use super::flight_plan::AirplaneSection;
 use super::method::Methods;
 use super::settings::{
-    BuiltInMethod, ChangeWeight, Combinations, Cooling, Decision, Deployment, Fading, Gibibytes,
+    AltitudeLimit, BuiltInMethod, ChangeWeight, Combinations, Cooling, Decision, Deployment, Fading, Gibibytes,
     Grouping, HeadingNoise, Inflation, LevelGap, LookAhead, RecordSection, RightOfWayRule,
     RoundCount, Step, Tolerance, Weight,
 };
 use super::shield::Fallback;
 use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
 use super::world::AirspaceWorld;
-use airplanes::{GeneratorSection, ModelSection};
+use airplanes::ModelSection;
 use areas::{AreaSection, load_areas_file};
 use compile::Compiler;
+use generator::GeneratorSection;
 use gusts::GustsSection;
 use measures::{MeasuresSection, NmacSection, WellClearSection};
 use network::NetworkSection;
@@ -136,6 +138,8 @@ struct AirspaceSection {
     /// The true minimum of the objective is recorded for groups of up to this many airplanes.
     minimum_up_to: Option<Integer<0, 100>>,
     vertical_m: Option<Number<LevelGap>>,
+    /// Altitude below which an airplane that the shield holds is in danger: a minimum sector altitude.
+    safe_altitude_m: Option<AltitudeLimit>,
     /// File of types of airplanes: [types.NAME] with the keys of [airplane] for each.
     types_file: Option<Spanned<String>>,
     /// Folder openap/data of an installed OpenAP, with types of airliners by their ICAO designators.
@@ -205,6 +209,8 @@ pub struct CompiledAirspace {
     pub fallbacks: Arc<Vec<Fallback>>,
     /// Pairs with first fallbacks that are not apart: the shield promises nothing for them.
     pub too_close: Vec<(u32, u32)>,
+    /// Number of those of them for which the search for others has come to its limit.
+    pub unproved_pairs: u64,
     /// The text that it was compiled from.
     recipe: Arc<ParsedScenario>,
 }
@@ -326,6 +332,7 @@ impl CompiledAirspace {
             external_actions: Vec::new(),
             controls: None,
             efforts: Vec::new(),
+            holds: Vec::new(),
         }
     }
 }

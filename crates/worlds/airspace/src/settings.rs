@@ -5,7 +5,7 @@ mod changes;
 mod values;
 
 pub(crate) use abilities::{
-    AbilityKeys, AltitudeLimit, PositiveRate, SpeedLimit, TypeSection, ability_keys,
+    AbilityKeys, AltitudeLimit, PositiveRate, PositiveTime, SpeedLimit, TypeSection, ability_keys,
 };
 pub(crate) use changes::ChangeList;
 pub use changes::Combinations;

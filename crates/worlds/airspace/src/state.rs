@@ -2,6 +2,7 @@
 
 mod command;
 mod end;
+mod hold;
 mod neighborhood;
 mod snapshot;
 
@@ -16,6 +17,7 @@ use super::shield::{ExemptIds, Fallback};
 use super::world::AirspaceWorld;
 pub use command::AirplaneCommand;
 pub use end::{FlightEnd, PackedFlightEnd};
+pub use hold::HoldState;
 use neighborhood::SpatialIndex;
 use sidestep_kernel::column::AtomicCell;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot, math};
@@ -42,6 +44,9 @@ pub struct AirspaceState {
     turn_rates_rad_s: Box<[AtomicCell<f64>]>,
     /// What the flight of each airplane has cost; empty unless that is measured.
     efforts: Box<[Mutex<FlightEffort>]>,
+    /// The holds of each airplane by the shield; empty where none can be held on its way to a level, and no altitude is
+    /// known to be safe.
+    holds: Box<[AtomicCell<HoldState>]>,
     /// The altitude in meters to which each airplane may change its level in this cycle. It is found anew in each cycle,
     /// and so no part of a snapshot.
     cleared_m: Box<[AtomicCell<f64>]>,
@@ -227,6 +232,7 @@ impl AirspaceState {
             if matches!(world.method, MethodKind::External) { n } else { 0 };
         let with_efforts = if world.measures.flights.is_some() { n } else { 0 };
         let with_commands = if world.has_commands() { n } else { 0 };
+        let with_holds = if world.has_holds() { n } else { 0 };
         let controls_cycle = AtomicCell::default();
         controls_cycle.set(NEVER);
         let state = Self {
@@ -238,6 +244,9 @@ impl AirspaceState {
             exempt: (0..n).map(|_| Mutex::default()).collect(),
             orbit_poses: (0..with_orbit_poses).map(|_| OrbitPose::default()).collect(),
             efforts: restore_memories(with_efforts, &snapshot.efforts),
+            holds: (0..with_holds)
+                .map(|i| AtomicCell::new(snapshot.holds.get(i).copied().unwrap_or_default()))
+                .collect(),
             cleared_m: snapshot
                 .airplanes
                 .iter()
@@ -390,6 +399,18 @@ impl AirspaceState {
         put_memories(&self.efforts, &[slot], vec![effort]);
     }
 
+    /// Returns the holds of an airplane; nothing where none can be held.
+    pub(super) fn hold(&self, slot: EntitySlot) -> Option<HoldState> {
+        self.holds.get(slot as usize).map(AtomicCell::get)
+    }
+
+    /// Stores the holds of an airplane; nothing where none can be held.
+    pub(super) fn set_hold(&self, slot: EntitySlot, hold: HoldState) {
+        if let Some(one) = self.holds.get(slot as usize) {
+            one.set(hold);
+        }
+    }
+
     /// Returns the present state, which is that after `cycle` cycles: the state itself does not count them.
     pub fn snapshot(&self, cycle: Cycle) -> Snapshot {
         let mut exempt = Vec::new();
@@ -415,6 +436,7 @@ impl AirspaceState {
             external_actions: self.external_actions.iter().map(|one| lock(one).clone()).collect(),
             controls,
             efforts: self.efforts.iter().map(|one| *lock(one)).collect(),
+            holds: self.holds.iter().map(AtomicCell::get).collect(),
         }
     }
 

@@ -331,12 +331,29 @@ fn orders_and_tracks_text(m: &Metrics) -> KeyValues {
     if m.orders + m.orders_delayed > 0 {
         let done = group_thousands(m.orders);
         let waits = group_thousands(m.orders_delayed);
-        lines.push(key_value_pair(
-            "orders",
-            format!("{done} carried out, delayed {waits} times by one dt"),
-        ));
+        let mut words = format!("{done} carried out, delayed {waits} times by one dt");
+        if m.shield_level_offs > 0 {
+            let level_offs = group_thousands(m.shield_level_offs);
+            words += &format!(", and {level_offs} times held on the way to a level");
+        }
+        lines.push(key_value_pair("orders", words));
     }
+    lines.extend(dangerous_holds_warning(m));
     lines
+}
+
+/// Returns the warning of holds below the safe altitude, and of flights longer than the fuel; none where there were none.
+fn dangerous_holds_warning(m: &Metrics) -> Option<(String, String)> {
+    let counts = [
+        (m.low_holds, "holds below the safe altitude"),
+        (m.endurance_exceedances, "airplanes in the air for longer than their endurance"),
+    ];
+    let words: Vec<String> = counts
+        .into_iter()
+        .filter_map(|(count, what)| Some((count.filter(|count| *count > 0)?, what)))
+        .map(|(count, what)| format!("{} {what}", group_thousands(count)))
+        .collect();
+    (!words.is_empty()).then(|| key_value_pair("WARNING", words.join(", ")))
 }
 
 /// Largest number of pairs or airplanes that a warning lists.

@@ -254,6 +254,22 @@ pub(super) fn to_log_event(event: &Event) -> LogEvent {
         EventKind::CommandHeld => {
             (Severity::Info, "is kept by the shield from a level or a speed that it wanted".into())
         }
+        EventKind::LevelOff => {
+            (Severity::Info, format!("is held on its way to a level, at {value:.0} m"))
+        }
+        EventKind::LowHold => {
+            (Severity::Warning, format!("is held below the safe altitude, at {value:.0} m"))
+        }
+        EventKind::EnduranceExceedance => (
+            Severity::Error,
+            format!("is in the air for longer than its endurance of {value:.0} s"),
+        ),
+        EventKind::SearchLimit => (
+            Severity::Warning,
+            format!(
+                "comes too close to airplane/{other}, as far as a search up to its limit shows"
+            ),
+        ),
     };
     let airplane = |id| BodyId::new(kinds::AIRPLANE, id, None);
     LogEvent {

@@ -8,9 +8,9 @@ use super::areas::{AreaContext, Areas, LocalAreas};
 use super::baseline::mvp::{MvpRules, ResolutionSettings};
 use super::flight::{
     Action, AirplaneStart, ChangeableFlight, Chart, CommandKinds, DetourAlternatives, DoneOrders,
-    FlightChange, FlightConditions, FlightLevelRange, FlightPhase, Gusts, InterOrderSegment,
-    KnownAircraft, MethodCommand, Point, Pose2, RoutePosition, SegmentAfterOrder, Surface,
-    TimeDiscretization, Track, WaypointRule, WindField, actions, actions_at_turn_rate,
+    FlightChange, FlightConditions, FlightLevelRange, FlightOrder, FlightPhase, FlightTask, Gusts,
+    InterOrderSegment, KnownAircraft, MethodCommand, Point, Pose2, RoutePosition, SegmentAfterOrder,
+    Surface, TimeDiscretization, Track, WaypointRule, WindField, actions, actions_at_turn_rate,
     segments_after_orders,
 };
 use super::flight_plan::CLIMB_M_S;
@@ -83,6 +83,8 @@ pub struct AirspaceWorld {
     /// slightly less than the scenario asks for, so that levels in feet are apart when they are
     /// nominally so.
     pub vertical_m: f64,
+    /// Altitude in meters below which an airplane that the shield holds is in danger, if one is known.
+    pub safe_altitude_m: Option<f64>,
     /// Number of cycles in which recorded airplanes follow their tracks; then the method flies
     /// them.
     pub replay_cycles: Cycle,
@@ -139,6 +141,13 @@ pub struct AirspaceWorld {
 }
 
 impl AirspaceWorld {
+    /// Returns whether the shield may hold airplanes in a way that is counted: off a level, or below the safe altitude.
+    pub(crate) fn has_holds(&self) -> bool {
+        let is_level = |order: &FlightOrder| matches!(order.task, FlightTask::Altitude { .. });
+        let changes_level = || self.airplanes.iter().any(|one| one.orders.iter().any(is_level));
+        self.shield && (self.safe_altitude_m.is_some() || changes_level())
+    }
+
     /// Returns the call sign of an airplane, if it has one.
     pub(crate) fn callsign(&self, id: EntityId) -> Option<String> {
         self.airplanes.get(id as usize)?.callsign.clone()

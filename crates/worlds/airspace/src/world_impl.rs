@@ -45,6 +45,7 @@ impl CompiledAirspace {
         let state = AirspaceState::restore(&self.world, &self.start_snapshot());
         let mut counters = Counters::default();
         self.too_close.iter().for_each(|&pair| counters.add_too_close_pair(0, pair));
+        counters.add_unproved_pairs(self.unproved_pairs);
         let collector =
             Collector { counters, rows: RecordBuffers::new(self.record), ..Collector::default() };
         let plan = self.plan();

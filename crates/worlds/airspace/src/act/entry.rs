@@ -1,14 +1,18 @@
 //! Airplanes that enter during a run: they appear, or the method takes over from their track. Also the pairs whose
 //! separation the shield does not guarantee.
 //!
-//! Such a pair becomes *exempt* when the later of the two enters and there are no orbits for it that are apart. That
-//! concerns the pair, not the two airplanes: each of them stays apart from all others. It ends for good as soon as
+//! Such a pair becomes *exempt* when the later of the two enters and no joint choice of fallbacks keeps the two apart
+//! beside all others (`shield/joint_fallbacks.rs`). That concerns the pair, not the two airplanes: each of them stays apart from all others. It ends for good as soon as
 //! their stored fallbacks are apart, their levels do not meet, or one of them is gone; from then on the invariant holds
 //! for this pair as for any other.
 
 use super::protect::shielded_aircraft;
+use crate::events::{Event, EventKind};
 use crate::scratch::PhaseContext;
-use crate::shield::{Fallback, OrbitSide, ShieldedAircraft, entry_fallbacks, renewed_fallbacks};
+use crate::shield::{
+    EntryFallbacks, EntryRole, Fallback, OrbitSide, ShieldedAircraft, entry_fallbacks,
+    renewed_fallbacks,
+};
 use sidestep_kernel::EntitySlot;
 
 /// Ends the exemption of pairs that are safe by now. `flown` are the group's airplanes that the method
@@ -54,11 +58,16 @@ pub(super) fn renew_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySlo
     }
 }
 
-/// Chooses fallbacks for the airplanes of a group that enter now, apart from the stored ones, which stay as they are.
-/// Pairs without such fallbacks become exempt. `flown` are the group's airplanes that the method flies, by id.
+/// Chooses fallbacks for the airplanes of a group that enter now, apart from the stored ones, which stay as they are unless
+/// only others are apart. Pairs without such fallbacks become exempt. `flown` are the group's airplanes that the method
+/// flies, by id.
 ///
-/// Airplanes that could be too near one that enters are in its group, so none is missed.
-pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySlot]) {
+/// Airplanes that could be too near one that enters are in its group, so none is missed. `has_non_cooperative` says whether there are airplanes in the group that avoid nobody.
+pub(super) fn assign_fallbacks(
+    context: &mut PhaseContext<'_>,
+    flown: &[EntitySlot],
+    has_non_cooperative: bool,
+) {
     let PhaseContext { world, state, now, .. } = *context;
     // At the start, the first fallbacks are those of the compiled scenario.
     if now == 0 {
@@ -66,11 +75,9 @@ pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySl
     }
     // Under other rules each pair has to be apart anew.
     let is_changing = world.rules_begin_at(now);
-    let is_entering: Vec<bool> = flown
-        .iter()
-        .map(|&slot| is_changing || world.first_controlled_cycle(slot as usize) == now)
-        .collect();
-    if !is_entering.contains(&true) {
+    let is_entering =
+        |slot: EntitySlot| is_changing || world.first_controlled_cycle(slot as usize) == now;
+    if !flown.iter().any(|&slot| is_entering(slot)) {
         return;
     }
     let mut group: Vec<ShieldedAircraft> =
@@ -81,11 +88,20 @@ pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySl
             one.choices = OrbitSide::BOTH.map(Fallback::from_side).into();
         }
     }
-    let (fallbacks, too_close) = entry_fallbacks(&group, |i| is_entering[i]);
-    for (k, (&slot, fallback)) in flown.iter().zip(fallbacks).enumerate() {
+    // Where messages get lost, others know the fallbacks of those that fly from having watched them; and beside
+    // non-cooperative aircraft another fallback may lead to one.
+    let others = if world.network.is_some() || has_non_cooperative {
+        EntryRole::Keep
+    } else {
+        EntryRole::Yield
+    };
+    let role = |&slot: &EntitySlot| if is_entering(slot) { EntryRole::Enter } else { others };
+    let roles: Vec<EntryRole> = flown.iter().map(role).collect();
+    let EntryFallbacks { fallbacks, too_close, unproved } = entry_fallbacks(&group, &roles);
+    for ((&slot, role), fallback) in flown.iter().zip(roles).zip(fallbacks) {
         let current = &state.airplanes[slot as usize];
         current.fallback.set(fallback);
-        if is_entering[k] {
+        if role == EntryRole::Enter {
             // It depends on fallbacks of others that not all need know.
             current.tracked.set(0);
         }
@@ -93,5 +109,9 @@ pub(super) fn assign_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySl
     for (i, j) in too_close {
         state.exempt_pair(flown[i], flown[j]);
         context.scratch.too_close.push((now, flown[i], flown[j]));
+    }
+    for (i, j) in unproved {
+        let event = Event::new_for_pair(now, EventKind::SearchLimit, flown[i], flown[j]);
+        context.scratch.events.push(event);
     }
 }

@@ -82,8 +82,9 @@ fn record_wait(context: &mut PhaseContext<'_>, slot: EntitySlot, altitude_m: f64
     let &mut PhaseContext { state, now, ref mut scratch, .. } = context;
     let current = &state.airplanes[slot as usize];
     let command = state.command(slot);
+    // Metrics take level-offs off these waits again.
+    current.waits.set(current.waits.get().saturating_add(1));
     if command.in_force.level.is_none() {
-        current.waits.set(current.waits.get().saturating_add(1));
         return;
     }
     scratch.events.push(Event::new(now, EventKind::CommandHeld, slot));

@@ -29,7 +29,7 @@ fn cross(airspace: &str, keys: &str) -> ([Deviation; 2], AirspaceRun) {
         + &plane([0.0, -4000.0], 90.0, [0.0, 6000.0], &level);
     let mut run = run(airspace, &airplanes);
     let mut deviations = [Deviation::default(); 2];
-    for cycle in 0..50 {
+    for cycle in 0..80 {
         run.advance(1);
         let world = run.world();
         let state = run.state();

@@ -50,6 +50,8 @@ pub struct Performance {
     pub ceiling_m: f64,
     /// Largest change of airspeed in meters per second squared; infinite where speeds change at once.
     pub acceleration_m_s2: f64,
+    /// Time for which its fuel, or its battery, lasts, in seconds; infinite where nobody knows.
+    pub endurance_s: f64,
 }
 
 impl Performance {
@@ -65,6 +67,7 @@ impl Performance {
             floor_m: f64::NEG_INFINITY,
             ceiling_m: f64::INFINITY,
             acceleration_m_s2: f64::INFINITY,
+            endurance_s: f64::INFINITY,
         }
     }
 

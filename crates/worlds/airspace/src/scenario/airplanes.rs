@@ -7,9 +7,8 @@ use crate::flight::{
     TimeDiscretization, Track,
 };
 use crate::flight_plan::{AirplaneSection, mixed_positions};
-use crate::generate::{GeneratorKind, GeneratorParams, generate};
 use crate::settings::{
-    AbilityKeys, AltitudeLimit, Bank, ChangeList, Combinations, PositiveRate, SeparationM, Speed,
+    AbilityKeys, AltitudeLimit, Bank, ChangeList, Combinations, PositiveRate, PositiveTime, SeparationM, Speed,
     SpeedLimit, TurnCount, TurnRate, ability_keys,
 };
 use schemars::JsonSchema;
@@ -17,7 +16,7 @@ use serde::Deserialize;
 use sidestep_import::traffic::MAX_SPEED_M_S;
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Streams;
-use sidestep_scenario::{Integer, Number, Open, RightOpen, Spanned};
+use sidestep_scenario::{Number, Spanned};
 use std::collections::BTreeMap;
 
 /// The paper's airplane, for keys that a scenario leaves out.
@@ -27,21 +26,6 @@ const PAPER_MODEL: AircraftModel = AircraftModel {
     separation_m: 500.0,
     turns: 5,
 };
-/// Radius in meters of the paper's circle.
-const PAPER_RADIUS_M: f64 = 6_500.0;
-/// Default of the random displacement of generated starts: as much as breaks all symmetries, and far less than the
-/// separation.
-const DEFAULT_JITTER_M: f64 = 20.0;
-
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GeneratorSection {
-    kind: GeneratorKind,
-    /// Number of airplanes.
-    n: Integer<1, 1_000_000>,
-    radius_m: Option<Number<Open<0, 1_000_000_000>>>,
-    jitter_m: Option<Number<RightOpen<0, 1_000_000>>>,
-}
 
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -69,6 +53,8 @@ pub(super) struct ModelSection {
     pub(super) ceiling_m: Option<AltitudeLimit>,
     /// Greatest change of airspeed; without it speeds change at once.
     pub(super) acceleration_m_s2: Option<PositiveRate>,
+    /// Time for which its fuel, or its battery, lasts; longer flights are reported.
+    pub(super) endurance_s: Option<PositiveTime>,
     /// Distance that all keep from each other.
     separation_m: Option<SeparationM>,
     turns: Option<TurnCount>,
@@ -87,21 +73,21 @@ impl ModelSection {
 
 /// The abilities of one airplane, and its separation.
 #[derive(Debug, Clone)]
-struct Abilities {
+pub(super) struct Abilities {
     keys: AbilityKeys,
     type_name: Option<String>,
     separation_m: f64,
     turns: usize,
-    changes: ChangeAlternatives,
+    pub(super) changes: ChangeAlternatives,
 }
 
 impl Abilities {
-    fn performance(&self) -> Performance {
+    pub(super) fn performance(&self) -> Performance {
         performance_from_keys(&self.keys, self.type_name.clone(), PAPER_MODEL.omega_max_rad_s)
     }
 
     /// Returns the model of an airplane with some performance and speed.
-    fn model(&self, performance: &Performance, v_m_s: f64) -> AircraftModel {
+    pub(super) fn model(&self, performance: &Performance, v_m_s: f64) -> AircraftModel {
         AircraftModel {
             v_m_s,
             omega_max_rad_s: performance.turn.omega_rad_s(v_m_s),
@@ -110,7 +96,7 @@ impl Abilities {
         }
     }
 
-    fn v_m_s(&self) -> f64 {
+    pub(super) fn v_m_s(&self) -> f64 {
         self.keys.v_m_s.unwrap_or(PAPER_MODEL.v_m_s)
     }
 }
@@ -127,7 +113,7 @@ pub(super) struct ReplayPeriod {
 impl Compiler<'_> {
     /// Returns the abilities of an airplane of the file, or of the generated ones: by its own keys, then its own type,
     /// then the keys and the type of all. Of two types only one counts: a mixture of both is none that flies.
-    fn abilities(&self, own: Option<&Spanned<AirplaneSection>>) -> Abilities {
+    pub(super) fn abilities(&self, own: Option<&Spanned<AirplaneSection>>) -> Abilities {
         let usual = ModelSection::default();
         let common = self.file.airplane.as_ref().unwrap_or(&usual);
         let own = own.map(Spanned::get_ref);
@@ -174,6 +160,11 @@ impl Compiler<'_> {
             None => Vec::new(),
         };
         let mut named: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for (id, airplane) in all.iter().enumerate() {
+            if let Some(callsign) = &airplane.callsign {
+                named.entry(callsign.clone()).or_default().push(id);
+            }
+        }
         for section in &self.file.airplanes.0 {
             let own = self.abilities(Some(section));
             let airplane = match section.get_ref().track(self.source)? {
@@ -216,75 +207,6 @@ impl Compiler<'_> {
             }
         }
         Ok(surface.unwrap_or_default())
-    }
-
-    /// Refuses generated traffic, which is in a plane, beside positions on the earth.
-    fn check_generator_surface(&self) -> Result<(), InputError> {
-        match &self.file.airspace.generator {
-            Some(generator) if self.surface()? == Surface::Earth => {
-                let cause =
-                    "generated airplanes, which fly over a plane, beside positions in degrees";
-                let remedy =
-                    "leave out [airspace.generator], or give all airplanes at_m and way_points_m";
-                Err(self.source.error(generator.span(), cause, remedy))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn generate_airplanes(
-        &self,
-        section: &Spanned<GeneratorSection>,
-        streams: &Streams,
-    ) -> Result<Vec<AirplaneStart>, InputError> {
-        let s = section.get_ref();
-        let abilities = self.abilities(None);
-        let performance = abilities.performance();
-        let model = &abilities.model(&performance, abilities.v_m_s());
-        if s.kind == GeneratorKind::Random && s.jitter_m.is_some() {
-            let because = "for kind = \"random\", whose places are all drawn";
-            return Err(self.source.unused_key("airspace.generator.jitter_m", because));
-        }
-        let n = s.n.get() as usize;
-        let default_radius_m = match s.kind {
-            // With five or more as dense as five airplanes in the paper's circle.
-            GeneratorKind::Random => PAPER_RADIUS_M * (n as f64 / 5.0).max(1.0).sqrt(),
-            _ => PAPER_RADIUS_M,
-        };
-        let radius_m = s.radius_m.map_or(default_radius_m, f64::from);
-        let jitter_m = s.jitter_m.map_or(DEFAULT_JITTER_M, f64::from);
-        let errors_m = self.error_margin_m(model);
-        let performance = &performance;
-        let params = GeneratorParams {
-            kind: s.kind,
-            n,
-            radius_m,
-            jitter_m,
-            model,
-            performance,
-            changes: &abilities.changes,
-            errors_m,
-        };
-        let generated = generate(&params, streams).map_err(|placed| {
-            let cause = format!("no place is left after {placed} of {n} airplanes");
-            self.source.error(section.span(), cause, "give a larger radius_m or a smaller n")
-        })?;
-        // All have the same abilities.
-        if let Some(first) = generated.first() {
-            self.check_performance(first, None)?;
-        }
-        Ok(generated)
-    }
-
-    /// Returns how much farther from each other two airplanes of a model have to start, because of errors: they are
-    /// perceived at other places, and their orbits are wider.
-    fn error_margin_m(&self, model: &AircraftModel) -> f64 {
-        let bounds = self.error_bounds();
-        let dt_s = self.file.airspace.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
-        let Some(rate_rad_s) = bounds.max_orbit_rate_rad_s(model, dt_s) else { return 0.0 };
-        let wider_m = model.v_m_s / rate_rad_s - model.turn_radius_m();
-        // Two orbits, each with a diameter that grows by twice the radius.
-        4.0 * wider_m + 2.0 * bounds.position_m + 2.0 * bounds.error_m(model.v_m_s, dt_s)
     }
 
     /// Returns an airplane with a flight plan of its own.

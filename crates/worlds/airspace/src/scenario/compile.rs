@@ -96,12 +96,8 @@ impl<'a> Compiler<'a> {
         self.check_commands(&world)?;
         self.check_action_set_sizes(&world)?;
         self.check_heading_noise(&world)?;
-        let (fallbacks, too_close) = if world.shield {
-            first_fallbacks_of(&world)
-        } else {
-            (vec![Fallback::default(); world.airplanes.len()], Vec::new())
-        };
-        let fallbacks = Arc::new(fallbacks);
+        let first = first_fallbacks_of(&world);
+        let fallbacks = Arc::new(first.fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
         world.later_rules = Arc::new(self.later_rules(&world)?);
         self.check_wind_field(&world)?;
@@ -116,7 +112,8 @@ impl<'a> Compiler<'a> {
             cycles,
             record: self.file.record,
             fallbacks,
-            too_close,
+            too_close: first.too_close,
+            unproved_pairs: first.unproved_pairs,
             recipe: Arc::clone(self.recipe),
         };
         self.check_group_memory(&compiled)?;
@@ -203,6 +200,7 @@ impl<'a> Compiler<'a> {
             right_of_way: section.right_of_way,
             uses_right_of_way: false,
             vertical_m,
+            safe_altitude_m: section.safe_altitude_m.map(f64::from),
             origin_deg,
             surface,
             curvature_m: 0.0,
@@ -548,9 +546,22 @@ fn last_change_s(world: &AirspaceWorld, i: usize) -> f64 {
     last_s.max(world.cycle_start_s(world.appearance_cycle(i)))
 }
 
-/// Returns first fallbacks that are apart as far as possible, and the pairs that are not apart.
-fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Fallback>, Vec<(u32, u32)>) {
+/// The fallbacks with which airplanes start.
+struct FirstFallbacks {
+    /// Those of all airplanes, by id.
+    fallbacks: Vec<Fallback>,
+    /// The pairs that are not apart.
+    too_close: Vec<(u32, u32)>,
+    /// Number of those of them for which the search has come to its limit.
+    unproved_pairs: u64,
+}
+
+/// Returns first fallbacks that are apart as far as possible. Without the shield nobody needs any.
+fn first_fallbacks_of(world: &AirspaceWorld) -> FirstFallbacks {
     let mut fallbacks = vec![Fallback::default(); world.airplanes.len()];
+    if !world.shield {
+        return FirstFallbacks { fallbacks, too_close: Vec::new(), unproved_pairs: 0 };
+    }
     // Airplanes that enter at other times do not meet at the start.
     let starts: Vec<usize> = (0..fallbacks.len())
         .filter(|&i| world.first_controlled_cycle(i) == 0 && !world.is_non_cooperative(i as u32, 0))
@@ -581,11 +592,13 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> (Vec<Fallback>, Vec<(u32, u32)>)
             areas: world.areas_around(i as u32, (seen.at, altitude_m), 0),
         });
     }
-    let (chosen, pairs) = first_fallbacks(&group);
-    for (&i, fallback) in starts.iter().zip(chosen) {
+    let chosen = first_fallbacks(&group);
+    for (&i, fallback) in starts.iter().zip(chosen.fallbacks) {
         fallbacks[i] = fallback;
     }
-    (fallbacks, pairs.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect())
+    let too_close =
+        chosen.too_close.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect();
+    FirstFallbacks { fallbacks, too_close, unproved_pairs: chosen.unproved.len() as u64 }
 }
 
 /// Returns the remedy that lets a method command neither levels nor speeds.

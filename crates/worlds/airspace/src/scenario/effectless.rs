@@ -3,7 +3,7 @@
 //! They are no errors, because sweeps and `compare` fly one scenario by several methods.
 
 use super::{AirspaceSection, CompiledAirspace, ModelSection};
-use crate::flight::{FlightTask, TurnLimit};
+use crate::flight::{AirplaneStart, FlightTask, TurnLimit};
 use crate::method::MethodKind;
 use sidestep_scenario::Remark;
 
@@ -65,6 +65,13 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     if section.error_sigmas.is_some() && has_no_errors(section) {
         note("error_sigmas", "position_noise_m and heading_noise_deg are 0");
     }
+    if let Some(safe_m) = compiled.world.safe_altitude_m {
+        if compiled.world.all_rules().all(|rules| !rules.shield) {
+            note("safe_altitude_m", "without the shield no airplane is held");
+        } else if compiled.world.airplanes.iter().all(|one| min_altitude_m(one) >= safe_m) {
+            note("safe_altitude_m", "no airplane comes below it");
+        }
+    }
     if compiled.recipe.types.is_empty() {
         let files = [
             ("types_file", section.types_file.is_some()),
@@ -76,6 +83,14 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     }
     remarks.extend(effectless_limits(compiled));
     remarks
+}
+
+/// Returns the lowest altitude in meters that an airplane has by its start and its orders.
+fn min_altitude_m(airplane: &AirplaneStart) -> f64 {
+    airplane.orders.iter().fold(airplane.altitude_m, |low_m, order| match order.task {
+        FlightTask::Altitude { altitude_m, .. } => low_m.min(altitude_m),
+        _ => low_m,
+    })
 }
 
 /// Returns the remarks on limits for all airplanes that no airplane comes near.
@@ -105,6 +120,12 @@ fn effectless_limits(compiled: &CompiledAirspace) -> Vec<Remark> {
         ("acceleration_m_s2", keys.acceleration_m_s2.is_some() && !changes_speed, no_speed),
         ("climb_max_m_s", keys.climb_max_m_s.is_some() && !changes_level, no_level),
         ("descent_max_m_s", keys.descent_max_m_s.is_some() && !changes_level, no_level),
+        (
+            "endurance_s",
+            keys.endurance_s.is_some()
+                && (0..airplanes.len()).all(|i| !compiled.world.is_controlled(i)),
+            "no method flies any airplane",
+        ),
     ];
     let effectless = all.into_iter().filter(|(_, has_no_effect, _)| *has_no_effect);
     effectless
@@ -280,6 +301,14 @@ mod tests {
         );
         let off = "measures = { flights = \"off\", lift_to_drag = 12.0 }\n";
         assert_eq!(remarks(off), ["airspace.measures.lift_to_drag"]);
+    }
+
+    #[test]
+    fn a_safe_altitude_below_which_nobody_is_held_is_named() {
+        let named = ["airspace.safe_altitude_m"];
+        assert_eq!(remarks("safe_altitude_m = 100.0\n"), [""; 0], "all fly at 0 m");
+        assert_eq!(remarks("safe_altitude_m = -5.0\n"), named);
+        assert_eq!(remarks("safe_altitude_m = 100.0\nshield = \"off\"\n"), named);
     }
 
     #[test]

@@ -36,6 +36,7 @@ pub(super) fn performance_from_keys(
         floor_m: keys.floor_m.unwrap_or(f64::NEG_INFINITY),
         ceiling_m: keys.ceiling_m.unwrap_or(f64::INFINITY),
         acceleration_m_s2: keys.acceleration_m_s2.unwrap_or(f64::INFINITY),
+        endurance_s: keys.endurance_s.unwrap_or(f64::INFINITY),
     }
 }
 

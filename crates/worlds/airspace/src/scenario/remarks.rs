@@ -17,6 +17,7 @@ pub(crate) fn scenario_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     let mut remarks: Vec<Remark> = turn_remark(compiled).into_iter().collect();
     remarks.extend(missing_type_remarks(compiled));
     remarks.extend(area_remarks(compiled));
+    remarks.extend(endurance_remark(compiled));
     remarks.extend(effectless_remarks(compiled));
     // A stable sort, warnings first.
     remarks.sort_by_key(|remark| remark.severity != Severity::Warning);
@@ -65,6 +66,28 @@ fn turn_remark(compiled: &CompiledAirspace) -> Option<Remark> {
         round_to_hundredths(v_m_s),
     );
     Some(Remark::warning("airplane.omega_max_deg_s", words))
+}
+
+/// Returns a warning of airplanes whose flight takes longer than their endurance even if nobody delays it.
+fn endurance_remark(compiled: &CompiledAirspace) -> Option<Remark> {
+    let world = &*compiled.world;
+    let is_short = |id: &u32| {
+        let i = *id as usize;
+        world.alone_s[i] > world.airplanes[i].performance.endurance_s
+    };
+    let short: Vec<u32> = (0..world.airplanes.len() as u32).filter(is_short).collect();
+    let first = *short.first()?;
+    let others = match short.len() {
+        1 => String::new(),
+        many => format!("; so do {} more", many - 1),
+    };
+    let endurance_s = world.airplanes[first as usize].performance.endurance_s;
+    let words = format!(
+        "the flight of airplane {} alone takes {:.0} s, longer than the {endurance_s} s for which its fuel lasts{others}",
+        world.display_name(first),
+        world.alone_s[first as usize],
+    );
+    Some(Remark::warning("airplane.endurance_s", words))
 }
 
 /// Returns what an author may not expect of areas: airplanes that start, or have way-points, where an area does not permit
@@ -139,6 +162,14 @@ mod tests {
         scenario_remarks(
             &CompiledAirspace::new(&Source::new("test", text, "")).expect("a scenario"),
         )
+    }
+
+    #[test]
+    fn a_flight_that_is_longer_than_its_fuel_lasts_is_named() {
+        assert_eq!(remarks("endurance_s = 3000.0"), []);
+        let [warning] = &remarks("endurance_s = 2000.0")[..] else { panic!("one") };
+        assert_eq!(warning.severity, Severity::Warning);
+        assert!(warning.words.contains("2569 s, longer than the 2000 s"), "{}", warning.words);
     }
 
     #[test]

@@ -9,6 +9,8 @@ use sidestep_scenario::{Closed, LeftOpen, Number};
 pub(crate) type SpeedLimit = Number<Closed<0, 1_000_000>>;
 /// A vertical speed, or an acceleration, which is none at 0.
 pub(crate) type PositiveRate = Number<LeftOpen<0, 1_000_000_000>>;
+/// A time that is none at 0, in seconds.
+pub(crate) type PositiveTime = Number<LeftOpen<0, 1_000_000_000>>;
 /// An altitude within reasonable bounds.
 pub(crate) type AltitudeLimit = Number<Closed<-1_000_000_000, 1_000_000_000>>;
 
@@ -25,6 +27,7 @@ pub(crate) struct AbilityKeys {
     pub(crate) floor_m: Option<f64>,
     pub(crate) ceiling_m: Option<f64>,
     pub(crate) acceleration_m_s2: Option<f64>,
+    pub(crate) endurance_s: Option<f64>,
 }
 
 /// Returns the abilities that the keys of a section give.
@@ -41,6 +44,7 @@ macro_rules! ability_keys {
             floor_m: $section.floor_m.map(f64::from),
             ceiling_m: $section.ceiling_m.map(f64::from),
             acceleration_m_s2: $section.acceleration_m_s2.map(f64::from),
+            endurance_s: $section.endurance_s.map(f64::from),
         }
     };
 }
@@ -70,6 +74,8 @@ pub(crate) struct TypeSection {
     ceiling_m: Option<AltitudeLimit>,
     /// Greatest change of airspeed.
     acceleration_m_s2: Option<PositiveRate>,
+    /// Time for which its fuel, or its battery, lasts.
+    endurance_s: Option<PositiveTime>,
 }
 
 impl TypeSection {
@@ -93,6 +99,7 @@ impl AbilityKeys {
             floor_m: self.floor_m.or(other.floor_m),
             ceiling_m: self.ceiling_m.or(other.ceiling_m),
             acceleration_m_s2: self.acceleration_m_s2.or(other.acceleration_m_s2),
+            endurance_s: self.endurance_s.or(other.endurance_s),
         }
     }
 
@@ -109,6 +116,7 @@ impl AbilityKeys {
             ("floor_m", self.floor_m),
             ("ceiling_m", self.ceiling_m),
             ("acceleration_m_s2", self.acceleration_m_s2),
+            ("endurance_s", self.endurance_s),
         ];
         all.into_iter().filter_map(|(key, value)| Some((key, value?))).collect()
     }

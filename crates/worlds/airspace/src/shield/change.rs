@@ -2,28 +2,75 @@
 
 use super::drift::AirDrift;
 use super::fallback::Fallback;
+use super::joint_fallbacks::{EntryRole, JointOutcome, JointSearch};
 use super::neighbors::neighbors;
 use super::shielded_aircraft::{MARGIN_M, ShieldedAircraft};
 use crate::flight::FlightLevelRange;
+use std::collections::BTreeSet;
 
 /// Meters by which an airplane may climb or descend farther than was computed, by what is rounded. The difference of
 /// altitude that keeps levels apart is less than the scenario's by twice as much, so that levels that are apart
 /// nominally do not meet.
 const CLIMB_ROUNDING_M: f64 = 5e-7;
 
-/// Returns first fallbacks out of `choices` that are pairwise apart, as far as there are any, and the
-/// pairs that are not: they start too close.
-pub(crate) fn first_fallbacks(group: &[ShieldedAircraft]) -> (Vec<Fallback>, Vec<(usize, usize)>) {
-    entry_fallbacks(group, |_| true)
+/// Fallbacks of a group of which some airplanes enter.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct EntryFallbacks {
+    /// The fallback of each airplane.
+    pub(crate) fallbacks: Vec<Fallback>,
+    /// The pairs that no joint choice of fallbacks keeps apart beside all others: they are too close.
+    pub(crate) too_close: Vec<(usize, usize)>,
+    /// Those of them for which the search has come to its limit, so that there may be a joint choice.
+    pub(crate) unproved: Vec<(usize, usize)>,
 }
 
-/// Returns the same for airplanes some of which keep the fallbacks that they have: only the
-/// airplanes in `enters` choose, and only pairs with one of them are reported.
-pub(crate) fn entry_fallbacks(
-    group: &[ShieldedAircraft],
-    enters: impl Fn(usize) -> bool,
-) -> (Vec<Fallback>, Vec<(usize, usize)>) {
+/// Returns first fallbacks out of `choices` that are pairwise apart, as far as there are any.
+pub(crate) fn first_fallbacks(group: &[ShieldedAircraft]) -> EntryFallbacks {
+    entry_fallbacks(group, &vec![EntryRole::Enter; group.len()])
+}
+
+/// Returns the same for airplanes some of which have fallbacks already, with the role of each. Only pairs with one that
+/// enters are reported.
+pub(crate) fn entry_fallbacks(group: &[ShieldedAircraft], roles: &[EntryRole]) -> EntryFallbacks {
     let near = neighbors(group, ShieldedAircraft::fallback_reach_m);
+    let enters = |i: usize| roles[i] == EntryRole::Enter;
+    let fallbacks = descend(group, &near, &enters);
+    let mut too_close = BTreeSet::new();
+    for (i, others) in near.iter().enumerate() {
+        for &j in others.iter().filter(|&&j| i < j && (enters(i) || enters(j))) {
+            if !group[i].do_fallbacks_stay_apart(fallbacks[i], &group[j], fallbacks[j]) {
+                too_close.insert((i, j));
+            }
+        }
+    }
+    if too_close.is_empty() {
+        return EntryFallbacks { fallbacks, too_close: Vec::new(), unproved: Vec::new() };
+    }
+    let mut search = JointSearch::new(group, &near, roles, &fallbacks);
+    let mut unproved = Vec::new();
+    for pair in too_close.clone() {
+        if search.is_pair_apart(pair) {
+            continue;
+        }
+        match search.find(pair, &too_close) {
+            // The same choice may keep others apart as well.
+            JointOutcome::Found => too_close.retain(|&pair| !search.is_pair_apart(pair)),
+            JointOutcome::None => {}
+            JointOutcome::Unknown => unproved.push(pair),
+        }
+    }
+    unproved.retain(|pair| too_close.contains(pair));
+    let fallbacks = (0..group.len()).map(|i| search.fallback(i)).collect();
+    EntryFallbacks { fallbacks, too_close: too_close.into_iter().collect(), unproved }
+}
+
+/// Returns fallbacks of a group that has the fewest conflicts that changes of one airplane at a time lead to. That
+/// nearly always is none, and takes no search.
+fn descend(
+    group: &[ShieldedAircraft],
+    near: &[Vec<usize>],
+    enters: &impl Fn(usize) -> bool,
+) -> Vec<Fallback> {
     let mut chosen: Vec<Fallback> = Vec::with_capacity(group.len());
     for (i, aircraft) in group.iter().enumerate() {
         chosen.push(if enters(i) { aircraft.entry_fallback() } else { aircraft.fallback });
@@ -55,15 +102,7 @@ pub(crate) fn entry_fallbacks(
             }
         }
     }
-    let mut too_close = Vec::new();
-    for (i, others) in near.iter().enumerate() {
-        for &j in others.iter().filter(|&&j| i < j && (enters(i) || enters(j))) {
-            if !stay_apart((i, chosen[i]), (j, chosen[j])) {
-                too_close.push((i, j));
-            }
-        }
-    }
-    (chosen, too_close)
+    chosen
 }
 
 /// Returns the fallback out of `choices` with which an airplane that is about to fly as `changed` is apart from

@@ -28,8 +28,9 @@
 //!    compatible, so no two came nearer than `R` during `dt`, and the stored fallbacks keep the
 //!    invariant.
 //! 5. *Changes.* Between two `dt` a pair comes under the invariant in three ways, and never without
-//!    fallbacks that are apart: one of the two enters, and chooses a fallback apart from the other's,
-//!    or else the pair is exempt (`entry_fallbacks`); one is ordered to a speed, or passes levels in the next `dt`,
+//!    fallbacks that are apart: one of the two enters, and chooses a fallback apart from the other's, which may take
+//!    another one of its own for that, or else the pair is exempt, because there is no joint choice (`entry_fallbacks`,
+//!    `joint_fallbacks.rs`); one is ordered to a speed, or passes levels in the next `dt`,
 //!    which it does only as far as it has a fallback apart from those of all that it then has to avoid, regardless of
 //!    other exempt pairs (`safe_fallback`, `next_altitude`); or the exemption of the pair ends, which it does
 //!    once their fallbacks are apart (`act/entry.rs`). An airplane that leaves the world keeps every other pair as it was.
@@ -69,6 +70,7 @@ mod errors;
 mod fallback;
 #[cfg(test)]
 pub(crate) mod guarantee_tests;
+mod joint_fallbacks;
 mod neighbors;
 mod orbit;
 mod safe_maneuver;
@@ -76,18 +78,22 @@ mod search;
 mod shear;
 mod shielded_aircraft;
 #[cfg(test)]
+mod terminal_tests;
+#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod wind_tests;
 
 pub(crate) use change::{
-    altitude_short_of, entry_fallbacks, first_fallbacks, next_altitude, safe_fallback,
+    EntryFallbacks, altitude_short_of, entry_fallbacks, first_fallbacks, next_altitude,
+    safe_fallback,
 };
 pub(crate) use curvature::curvature_error_m;
 pub use drift::AirDrift;
 pub use errors::ErrorBounds;
 pub(crate) use errors::{OrbitTracker, common_orbit_rates};
 pub use fallback::Fallback;
+pub(crate) use joint_fallbacks::EntryRole;
 pub use orbit::OrbitSide;
 pub(crate) use orbit::stays_apart_for;
 pub(crate) use safe_maneuver::SafeManeuver;

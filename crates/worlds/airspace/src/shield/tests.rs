@@ -27,7 +27,7 @@ fn choices(max_lead_s: f64) -> Arc<[Fallback]> {
     Fallback::choices(&model, model.omega_max_rad_s, DTAU_S * STEPS as f64, max_lead_s)
 }
 
-fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
+pub(super) fn aircraft(x: f64, y: f64, heading_rad: f64, rank: u64) -> ShieldedAircraft {
     let pose = Pose2 { at: [x, y], heading_rad };
     ShieldedAircraft {
         id: rank as u32,
@@ -70,11 +70,14 @@ fn some_flyers() -> impl Strategy<Value = Vec<ShieldedAircraft>> {
 /// Airplanes with fallbacks that are apart; those that clash are left out.
 fn with_fallbacks(mut group: Vec<ShieldedAircraft>) -> Vec<ShieldedAircraft> {
     loop {
-        let (fallbacks, clashes) = first_fallbacks(&group);
-        match clashes.first() {
+        let first = first_fallbacks(&group);
+        match first.too_close.first() {
             Some(&(i, _)) => drop(group.remove(i)),
             None => {
-                group.iter_mut().zip(fallbacks).for_each(|(f, fallback)| f.fallback = fallback);
+                group
+                    .iter_mut()
+                    .zip(first.fallbacks)
+                    .for_each(|(f, fallback)| f.fallback = fallback);
                 return group;
             }
         }
@@ -236,12 +239,13 @@ fn who_enters_chooses_a_side_apart_from_the_stored_ones_and_nobody_else_does() {
     let stored = aircraft(0.0, 2002.0, std::f64::consts::PI, 0);
     let [left, right] = OrbitSide::BOTH.map(Fallback::from_side);
     let group = [stored.clone(), aircraft(0.0, 0.0, 0.0, 1)];
-    let (fallbacks, too_close) = entry_fallbacks(&group, |i| i == 1);
-    assert_eq!((fallbacks, too_close), (vec![left, right], vec![]));
+    let found = entry_fallbacks(&group, &[EntryRole::Yield, EntryRole::Enter]);
+    assert_eq!((found.fallbacks, found.too_close), (vec![left, right], vec![]));
     let near = [stored.clone(), aircraft(100.0, 2002.0, 0.0, 1), aircraft(50.0, 2030.0, 0.0, 2)];
-    let (fallbacks, too_close) = entry_fallbacks(&near, |i| i == 2);
-    assert_eq!(fallbacks[..2], [left; 2]);
-    assert_eq!(too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
+    let roles = [EntryRole::Yield, EntryRole::Yield, EntryRole::Enter];
+    let found = entry_fallbacks(&near, &roles);
+    assert_eq!(found.fallbacks[..2], [left; 2]);
+    assert_eq!(found.too_close, [(0, 2), (1, 2)], "the pair that was there before is not named");
 }
 
 #[test]
@@ -289,5 +293,5 @@ fn a_change_is_refused_when_no_fallback_is_apart() {
 fn airplanes_that_start_too_close_are_named() {
     let group =
         [aircraft(0.0, 0.0, 0.0, 0), aircraft(5e4, 0.0, 0.0, 1), aircraft(100.0, 0.0, 0.0, 2)];
-    assert_eq!(first_fallbacks(&group).1, [(0, 2)]);
+    assert_eq!(first_fallbacks(&group).too_close, [(0, 2)]);
 }

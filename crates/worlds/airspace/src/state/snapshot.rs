@@ -2,6 +2,7 @@
 
 use super::command::AirplaneCommand;
 use super::end::PackedFlightEnd;
+use super::hold::HoldState;
 use crate::agents::traffic_state::TrafficPicture;
 use crate::baseline::mvp::ActiveResolutions;
 use crate::external_action::ExternalAction;
@@ -79,6 +80,8 @@ pub struct Snapshot {
     pub controls: Option<Vec<AirplaneControl>>,
     /// What the flight of each airplane has cost, which affects no future; empty unless that is measured.
     pub efforts: Vec<FlightEffort>,
+    /// The holds of each airplane by the shield, which affect no future; empty where none can be held.
+    pub holds: Vec<HoldState>,
 }
 
 impl Snapshot {
