@@ -269,3 +269,141 @@ pub(crate) fn renewed_fallbacks(group: &[ShieldedAircraft]) -> Option<RenewedFal
     let too_close = due_pairs(&fallbacks);
     Some(RenewedFallbacks { fallbacks, too_close })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::drift::AirDrift;
+    use super::super::orbit::OrbitSide;
+    use super::super::shielded_aircraft::ExemptIds;
+    use super::*;
+    use crate::flight::{AircraftModel, FlightLevelRange, Frame, Pose2};
+    use proptest::prelude::*;
+
+    const DT_S: f64 = 5.0;
+
+    fn aircraft(id: u32, pose: Pose2, v_m_s: f64, drift: AirDrift) -> ShieldedAircraft {
+        let orbit_rad_s = 4f64.to_radians();
+        let model =
+            AircraftModel { v_m_s, omega_max_rad_s: orbit_rad_s, separation_m: 500.0, turns: 5 };
+        ShieldedAircraft {
+            id,
+            frame: Frame::PLANE,
+            pose,
+            orbit_pose: pose,
+            v_m_s,
+            omega_max_rad_s: orbit_rad_s,
+            orbit_rad_s,
+            separation_m: 500.0,
+            error_m: 0.0,
+            levels: FlightLevelRange::from_level(0.0),
+            drift,
+            vertical_m: 300.0,
+            fallback: Fallback::default(),
+            choices: Fallback::choices(&model, orbit_rad_s, DT_S, 60.0),
+            dt_s: DT_S,
+            exempt: ExemptIds::default(),
+            rank: u64::from(id),
+            areas: None,
+        }
+    }
+
+    fn some_aircraft(id: u32) -> impl Strategy<Value = ShieldedAircraft> {
+        let place = || -3000.0f64..3000.0;
+        let wind = || prop::array::uniform2(-15.0f64..15.0);
+        (place(), place(), -3.1f64..3.1, 25.0f64..50.0, wind(), wind(), any::<bool>(), 0usize..14)
+            .prop_map(move |(x, y, heading_rad, v_m_s, now, next, is_level, choice)| {
+                let next_m_s = if is_level { now } else { next };
+                let drift = AirDrift { now_m_s: now, next_m_s, varies_by_place: false };
+                let pose = Pose2 { at: [x, y], heading_rad };
+                let one = aircraft(id, pose, v_m_s, drift);
+                let fallback = one.choices[choice % one.choices.len()];
+                ShieldedAircraft { fallback, ..one }
+            })
+    }
+
+    /// Returns where an airplane on its stored fallback is after some seconds, flown in steps of 0.25 s.
+    fn flown(one: &ShieldedAircraft, seconds: f64) -> Vec<Point> {
+        let step_s = 0.25;
+        let mut pose = one.pose;
+        let mut fallback = one.fallback;
+        let mut points = vec![pose.at];
+        let per_cycle = (DT_S / step_s) as usize;
+        for k in 0..(seconds / step_s) as usize {
+            if k > 0 && k.is_multiple_of(per_cycle) {
+                fallback = fallback.after_cycle();
+            }
+            let omega_rad_s = fallback.omega_rad_s(one.orbit_rad_s);
+            let wind_m_s = if k < per_cycle { one.drift.now_m_s } else { one.drift.next_m_s };
+            pose = pose.step(one.v_m_s, omega_rad_s, step_s);
+            pose.at = add_scaled(pose.at, wind_m_s, step_s);
+            points.push(pose.at);
+        }
+        points
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+
+        /// Never wrongly later than they come too near: they are flown, each in its winds.
+        #[test]
+        fn until_a_conflict_that_is_found_two_are_apart(
+            a in some_aircraft(0), b in some_aircraft(1), in_one_wind in any::<bool>(),
+        ) {
+            let mut b = b;
+            if in_one_wind {
+                b.drift.next_m_s = a.drift.next_m_s;
+            }
+            let conflict_s = a.fallback_conflict_with_s(a.fallback, &b, b.fallback);
+            let paths = [&a, &b].map(|one| flown(one, 300.0));
+            let until_s = conflict_s.min(if in_one_wind { 300.0 } else { a.look_ahead_s() });
+            for (k, (p, q)) in paths[0].iter().zip(&paths[1]).enumerate() {
+                let t_s = 0.25 * k as f64;
+                let apart_m = norm(sub(*p, *q));
+                prop_assert!(t_s >= until_s || apart_m >= 500.0, "{apart_m} m at {t_s} s, conflict at {conflict_s} s");
+            }
+            prop_assert_eq!(conflict_s, b.fallback_conflict_with_s(b.fallback, &a, a.fallback));
+        }
+
+        /// Whatever a renewal leaves as it is, or names, no other pair comes too near in the cycle.
+        #[test]
+        fn after_a_renewal_only_pairs_that_are_named_come_too_near_in_the_cycle(
+            a in some_aircraft(0), b in some_aircraft(1), c in some_aircraft(2),
+        ) {
+            let group = [a, b, c];
+            let Some(renewed) = renewed_fallbacks(&group) else { return Ok(()) };
+            let paths: Vec<Vec<Point>> = group
+                .iter()
+                .zip(&renewed.fallbacks)
+                .map(|(one, &fallback)| flown(&ShieldedAircraft { fallback, ..one.clone() }, DT_S))
+                .collect();
+            for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+                let nearest_m = paths[i].iter().zip(&paths[j]).map(|(p, q)| norm(sub(*p, *q))).fold(f64::INFINITY, f64::min);
+                let is_named = renewed.too_close.contains(&(i, j));
+                prop_assert!(is_named || nearest_m >= 500.0, "{i} {j}: {nearest_m}");
+            }
+        }
+    }
+
+    /// Two on orbits that a wind drives together: one of them leaves its orbit before they are too near.
+    #[test]
+    fn a_fallback_that_a_wind_drives_toward_another_one_is_replaced() {
+        let drift = |east: f64| AirDrift {
+            now_m_s: [east, 0.0],
+            next_m_s: [east, 0.0],
+            varies_by_place: false,
+        };
+        let at = |x: f64| Pose2 { at: [x, 0.0], heading_rad: std::f64::consts::PI };
+        let left = Fallback::from_side(OrbitSide::Left);
+        let west = ShieldedAircraft { fallback: left, ..aircraft(0, at(0.0), 35.0, drift(15.0)) };
+        let far = ShieldedAircraft { fallback: left, ..aircraft(1, at(3000.0), 35.0, drift(0.0)) };
+        assert_eq!(renewed_fallbacks(&[west.clone(), far]), None);
+        // Next it flies toward the other one's side, at 15 m/s more.
+        let near = ShieldedAircraft {
+            fallback: Fallback::after_straight(6, OrbitSide::Left),
+            ..aircraft(1, at(560.0), 35.0, drift(-15.0))
+        };
+        let renewed = renewed_fallbacks(&[west.clone(), near.clone()]).expect("they come too near");
+        assert_ne!(renewed.fallbacks, [west.fallback, near.fallback]);
+        assert!(!west.is_in_shear_with(&west));
+    }
+}
