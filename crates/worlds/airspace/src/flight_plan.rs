@@ -10,8 +10,8 @@ use super::flight::{
     coordinates_from_degrees,
 };
 use super::settings::{
-    AbilityKeys, AltitudeLimit, Bank, ChangeList, PositiveRate, PositiveTime, SeparationM, Speed, SpeedLimit,
-    TurnCount, TurnRate, ability_keys,
+    AbilityKeys, AltitudeLimit, Bank, ChangeList, PositiveRate, PositiveTime, SeparationM, Speed,
+    SpeedLimit, SurveillanceCategory, TurnCount, TurnRate, ability_keys,
 };
 use limits::{LevelChange, Mistake, level_order_mistake, speed_order_mistake};
 use schemars::JsonSchema;
@@ -86,6 +86,10 @@ pub(super) struct AirplaneSection {
     pub(super) level_changes_m: Option<ChangeList>,
     /// Changes of speed among which method pc chooses, against the filed one.
     pub(super) speed_changes_m_s: Option<ChangeList>,
+    /// Category of accuracy of its reported positions, NACp of ADS-B, if not that of all.
+    pub(super) nac_p: Option<SurveillanceCategory>,
+    /// Category of integrity of its reported positions, NIC of ADS-B, if not that of all.
+    pub(super) nic: Option<SurveillanceCategory>,
     /// Priority from 0 to 3: it has right of way over airplanes with a smaller one.
     pub(super) priority: Option<Integer<0, 3>>,
     non_cooperative: Option<bool>,

@@ -30,12 +30,13 @@ pub(super) fn observed_pose(
     now: Cycle,
     mut pose: Pose2,
 ) -> Pose2 {
-    if world.disturbance.position_m > 0.0 {
+    let noise_m = world.position_noise_m(slot as usize);
+    if noise_m > 0.0 {
         let mut draws = world.streams.draws(slot, now, purpose::POSITION);
         let frame = world.surface.frame_at(pose.at);
         pose = frame.pose_to_local(pose);
         for coordinate in &mut pose.at {
-            *coordinate += world.disturbance.position_m * normal(&mut draws);
+            *coordinate += noise_m * normal(&mut draws);
         }
         pose = frame.pose_to_world(pose);
     }
@@ -159,7 +160,7 @@ fn non_cooperative_at(context: &PhaseContext<'_>, slot: EntitySlot) -> NonCooper
         velocity_m_s,
         top_m_s,
         separation_m: segment.model.separation_m,
-        error_m: world.bounds.position_m,
+        error_m: world.position_bound_m(slot as usize),
         altitude_m,
         climb_m_s,
         levels,

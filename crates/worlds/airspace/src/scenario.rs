@@ -15,6 +15,7 @@ mod performance;
 mod remarks;
 mod rule_changes;
 mod start_groups;
+mod surveillance;
 mod types;
 mod winds;
 
@@ -22,9 +23,9 @@ use super::flight::AirplaneStart;
 use super::flight_plan::AirplaneSection;
 use super::method::Methods;
 use super::settings::{
-    AltitudeLimit, BuiltInMethod, ChangeWeight, Combinations, Cooling, Decision, Deployment, Fading, Gibibytes,
-    Grouping, HeadingNoise, Inflation, LevelGap, LookAhead, RecordSection, RightOfWayRule,
-    RoundCount, Step, Tolerance, Weight,
+    AltitudeLimit, BuiltInMethod, ChangeWeight, Combinations, Cooling, Decision, Deployment,
+    Fading, Gibibytes, Grouping, HeadingNoise, Inflation, LevelGap, LookAhead, RecordSection,
+    RightOfWayRule, RoundCount, Step, Tolerance, Weight,
 };
 use super::shield::Fallback;
 use super::state::{AirplaneSnapshot, PackedFlightEnd, Snapshot};
@@ -281,7 +282,7 @@ impl CompiledAirspace {
     pub fn reseeded(&self, seed: u64) -> Result<Self, InputError> {
         let streams = Streams::new(Seed(seed));
         let is_drawn = self.recipe.file.airspace.generator.is_some();
-        if is_drawn || self.world.disturbance.position_m > 0.0 {
+        if is_drawn || self.world.has_position_errors {
             return Compiler::with_seed(&self.recipe, seed, &self.world).compile();
         }
         let fingerprint = self.recipe.fingerprint(seed);

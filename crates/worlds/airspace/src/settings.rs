@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder, Utility};
 pub(crate) use values::{
     Bank, ChangeWeight, Cooling, Decision, Fading, Gibibytes, HeadingNoise, Held, Inflation,
-    LevelGap, LookAhead, RoundCount, SeparationM, Speed, Step, Tolerance, TurnCount, TurnRate,
-    Weight,
+    LevelGap, LookAhead, RoundCount, SeparationM, Speed, Step, SurveillanceCategory, Tolerance,
+    TurnCount, TurnRate, Weight,
 };
 
 /// The methods by which airplanes choose their actions.

@@ -9,9 +9,9 @@ use super::baseline::mvp::{MvpRules, ResolutionSettings};
 use super::flight::{
     Action, AirplaneStart, ChangeableFlight, Chart, CommandKinds, DetourAlternatives, DoneOrders,
     FlightChange, FlightConditions, FlightLevelRange, FlightOrder, FlightPhase, FlightTask, Gusts,
-    InterOrderSegment, KnownAircraft, MethodCommand, Point, Pose2, RoutePosition, SegmentAfterOrder,
-    Surface, TimeDiscretization, Track, WaypointRule, WindField, actions, actions_at_turn_rate,
-    segments_after_orders,
+    InterOrderSegment, KnownAircraft, MethodCommand, Point, Pose2, RoutePosition,
+    SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, WindField, actions,
+    actions_at_turn_rate, segments_after_orders,
 };
 use super::flight_plan::CLIMB_M_S;
 use super::measures::{FlightEffort, MeasureSettings};
@@ -109,6 +109,12 @@ pub struct AirspaceWorld {
     pub areas: Areas,
     /// Random errors that no airplane knows.
     pub disturbance: Disturbance,
+    /// Standard deviation of each coordinate of the position in which all see an airplane, by id, in meters.
+    pub(crate) position_noise_m: Arc<[f64]>,
+    /// Whether some airplane is seen elsewhere than where it is.
+    pub(crate) has_position_errors: bool,
+    /// Bound on the errors of that position for which the shield allows, by id, in meters.
+    pub(crate) position_bound_m: Arc<[f64]>,
     /// Bounds on those errors for which the shield allows.
     pub bounds: ErrorBounds,
     /// The measures that a run takes.
@@ -299,9 +305,20 @@ impl AirspaceWorld {
         }
     }
 
+    /// Returns the standard deviation of each coordinate of the position in which all see an airplane, in meters.
+    pub fn position_noise_m(&self, i: usize) -> f64 {
+        self.position_noise_m[i]
+    }
+
+    /// Returns the bound on the errors of that position for which the shield allows, in meters.
+    pub fn position_bound_m(&self, i: usize) -> f64 {
+        self.position_bound_m[i]
+    }
+
     /// Returns how far an airplane may be from its plans as they are seen, in meters.
     pub(crate) fn error_m(&self, i: usize) -> f64 {
-        self.bounds.error_m(self.top_m_s[i], self.timing.dt_s) + self.curvature_m
+        let bounds = ErrorBounds { position_m: self.position_bound_m[i], ..self.bounds };
+        bounds.error_m(self.top_m_s[i], self.timing.dt_s) + self.curvature_m
     }
 
     fn max_speed_m_s(&self, i: usize) -> f64 {
@@ -504,7 +521,7 @@ impl AirspaceWorld {
         // Positions are seen with an error, too.
         (v_m_s * look_ahead_s).max(self.fallback_reach_m(i))
             + self.error_m(i)
-            + self.bounds.position_m
+            + self.position_bound_m[i]
             + self.drift_reach_m(i, look_ahead_s)
     }
 

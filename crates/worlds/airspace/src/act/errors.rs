@@ -14,7 +14,7 @@ use sidestep_kernel::math::wrap_angle;
 /// they hold, than the bounds allow.
 pub(super) fn report_beyond_bound(context: &mut PhaseContext<'_>, flown: &[EntitySlot]) {
     let world = context.world;
-    if world.disturbance == Default::default() {
+    if world.disturbance.heading_rad == 0.0 && !world.has_position_errors {
         return;
     }
     for &slot in flown {
@@ -38,7 +38,7 @@ fn error_ratio(context: &PhaseContext<'_>, slot: EntitySlot) -> f64 {
     let errors_and_bounds = [
         (
             world.surface.distance_m(observed_pose(world, slot, now, pose).at, pose.at),
-            world.bounds.position_m,
+            world.position_bound_m(slot as usize),
         ),
         (world.surface.distance_m(pose.at, at), max_deviation_m),
         (heading_error_rad, 2.0 * world.bounds.heading_rad),

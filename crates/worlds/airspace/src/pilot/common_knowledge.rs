@@ -254,7 +254,7 @@ pub(super) fn unheard_as_non_cooperative(
         velocity_m_s: [v_m_s * math::cos(heading_rad), v_m_s * math::sin(heading_rad)],
         top_m_s: world.top_m_s[one.id as usize],
         separation_m: segment.model.separation_m,
-        error_m: world.bounds.position_m,
+        error_m: world.position_bound_m(one.id as usize),
         altitude_m: one.altitude_m,
         climb_m_s: segment.signed_climb_m_s(one.altitude_m),
         levels: FlightLevelRange::between(one.altitude_m, segment.altitude_m),

@@ -8,8 +8,8 @@ use crate::flight::{
 };
 use crate::flight_plan::{AirplaneSection, mixed_positions};
 use crate::settings::{
-    AbilityKeys, AltitudeLimit, Bank, ChangeList, Combinations, PositiveRate, PositiveTime, SeparationM, Speed,
-    SpeedLimit, TurnCount, TurnRate, ability_keys,
+    AbilityKeys, AltitudeLimit, Bank, ChangeList, Combinations, PositiveRate, PositiveTime,
+    SeparationM, Speed, SpeedLimit, SurveillanceCategory, TurnCount, TurnRate, ability_keys,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -62,6 +62,10 @@ pub(super) struct ModelSection {
     pub(super) level_changes_m: Option<ChangeList>,
     /// Changes of speed among which method pc chooses, against the filed one.
     pub(super) speed_changes_m_s: Option<ChangeList>,
+    /// Category of accuracy of reported positions, NACp of ADS-B: a radius within which 95 % of them are.
+    pub(super) nac_p: Option<SurveillanceCategory>,
+    /// Category of integrity of reported positions, NIC of ADS-B: a radius for which the shield allows.
+    pub(super) nic: Option<SurveillanceCategory>,
 }
 
 impl ModelSection {

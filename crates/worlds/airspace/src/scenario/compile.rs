@@ -2,7 +2,6 @@
 
 use super::detours::DetourRules;
 use super::start_groups::largest_start_group;
-use super::winds::CompiledWind;
 use super::{AirspaceFile, CompiledAirspace, ParsedScenario, Preset};
 use crate::baseline::mvp::ResolutionSettings;
 use crate::flight::{AirplaneStart, CommandKinds, SpeedFactors};
@@ -123,9 +122,9 @@ impl<'a> Compiler<'a> {
     /// Returns the effect of another seed: traffic, errors and faults of messages are drawn;
     /// samples of the optimizer only guide its search.
     fn seed_effect(&self, world: &AirspaceWorld) -> SeedEffect {
-        let Disturbance { position_m, heading_rad } = world.disturbance;
+        let Disturbance { heading_rad, .. } = world.disturbance;
         let is_drawn = self.file.airspace.generator.is_some()
-            || position_m > 0.0
+            || world.has_position_errors
             || heading_rad > 0.0
             || world.gusts.is_some()
             || world.network.is_some();
@@ -151,11 +150,12 @@ impl<'a> Compiler<'a> {
         let origin_deg = self.origin_deg(surface, &airplanes)?;
         let areas = self.areas(surface)?;
         let passing = self.waypoint_rule(&airplanes);
+        let position_errors = self.position_errors(airplanes.len());
         let detours = DetourRules {
             surface,
             areas: &areas,
             tolerance_m: passing.tolerance_m,
-            error_m: self.error_bounds().position_m,
+            error_m: position_errors.bound_m.iter().copied().fold(0.0, f64::max),
         };
         detours.apply(&mut airplanes);
         let mvp = section.mvp.or_default(MVP);
@@ -173,11 +173,11 @@ impl<'a> Compiler<'a> {
             .iter()
             .map(|settings| settings.look_ahead_s)
             .fold(timing.horizon_s(), f64::max);
-        let CompiledWind { wind_m_s, field: wind_field } = self.wind(surface, &airplanes)?;
+        let wind = self.wind(surface, &airplanes)?;
         let world = AirspaceWorld {
             network: self.network(&timing, &airplanes)?,
-            wind_m_s,
-            wind_field,
+            wind_m_s: wind.wind_m_s,
+            wind_field: wind.field,
             gusts: self.gusts(&timing, &airplanes)?,
             passing,
             airplanes: Arc::new(airplanes),
@@ -208,6 +208,9 @@ impl<'a> Compiler<'a> {
             replay_cycles: replay.cycles,
             areas,
             disturbance: self.disturbance(),
+            has_position_errors: position_errors.noise_m.iter().any(|noise_m| *noise_m > 0.0),
+            position_noise_m: position_errors.noise_m.into(),
+            position_bound_m: position_errors.bound_m.into(),
             bounds: self.error_bounds(),
             measures: self.measures(look_ahead_s),
             fingerprint: self.recipe.fingerprint(self.seed),
@@ -325,14 +328,24 @@ impl<'a> Compiler<'a> {
     fn disturbance(&self) -> Disturbance {
         let section = &self.file.airspace;
         Disturbance {
-            position_m: section.position_noise_m.map_or(0.0, f64::from),
+            position_m: self.position_noise_m(),
             heading_rad: section.heading_noise_deg.map_or(0.0, f64::from).to_radians(),
         }
     }
 
-    /// Returns the bounds on errors for which the shield allows.
+    /// Returns the standard deviation of known positions, unless the category of an airplane says another one.
+    pub(super) fn position_noise_m(&self) -> f64 {
+        self.file.airspace.position_noise_m.map_or(0.0, f64::from)
+    }
+
+    /// Returns the number of standard deviations for which the shield allows.
+    pub(super) fn error_sigmas(&self) -> f64 {
+        self.file.airspace.error_sigmas.map_or(DEFAULT_SIGMAS, f64::from)
+    }
+
+    /// Returns the bounds on errors for which the shield allows, of airplanes without a category of their own.
     pub(super) fn error_bounds(&self) -> ErrorBounds {
-        let sigmas = self.file.airspace.error_sigmas.map_or(DEFAULT_SIGMAS, f64::from);
+        let sigmas = self.error_sigmas();
         let Disturbance { position_m, heading_rad } = self.disturbance();
         ErrorBounds { position_m: sigmas * position_m, heading_rad: sigmas * heading_rad }
     }

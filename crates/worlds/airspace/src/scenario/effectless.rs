@@ -62,8 +62,8 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     if section.measures.lift_to_drag.is_some() && !section.measures.flights.0 {
         note("measures.lift_to_drag", "measures.flights is \"off\"");
     }
-    if section.error_sigmas.is_some() && has_no_errors(section) {
-        note("error_sigmas", "position_noise_m and heading_noise_deg are 0");
+    if section.error_sigmas.is_some() && has_no_errors(compiled) {
+        note("error_sigmas", "no position and no heading has errors for which it counts");
     }
     if let Some(safe_m) = compiled.world.safe_altitude_m {
         if compiled.world.all_rules().all(|rules| !rules.shield) {
@@ -180,10 +180,10 @@ fn looks_anew(compiled: &CompiledAirspace) -> bool {
     })
 }
 
-fn has_no_errors(section: &AirspaceSection) -> bool {
+fn has_no_errors(compiled: &CompiledAirspace) -> bool {
+    let section = &compiled.recipe.file.airspace;
     let is_zero = |noise: Option<f64>| noise.is_none_or(|noise| noise == 0.0);
-    is_zero(section.position_noise_m.map(f64::from))
-        && is_zero(section.heading_noise_deg.map(f64::from))
+    is_zero(section.heading_noise_deg.map(f64::from)) && !compiled.world.has_position_errors
 }
 
 #[cfg(test)]

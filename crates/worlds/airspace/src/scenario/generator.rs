@@ -4,6 +4,7 @@ use super::compile::Compiler;
 use crate::flight::{AircraftModel, AirplaneStart, Performance, Surface};
 use crate::generate::{GeneratorKind, GeneratorParams, TerminalParams, TrafficKind, generate};
 use crate::settings::Speed;
+use crate::shield::ErrorBounds;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
@@ -273,7 +274,8 @@ impl Compiler<'_> {
     /// Returns how much farther from each other two airplanes of a model have to start, because of errors: they are
     /// perceived at other places, and their orbits are wider.
     fn error_margin_m(&self, model: &AircraftModel) -> f64 {
-        let bounds = self.error_bounds();
+        let position_m = self.position_error(None).bound_m;
+        let bounds = ErrorBounds { position_m, ..self.error_bounds() };
         let dt_s = self.file.airspace.dt_s.as_ref().map_or(5.0, |v| v.get_ref().get());
         let Some(rate_rad_s) = bounds.max_orbit_rate_rad_s(model, dt_s) else { return 0.0 };
         let wider_m = model.v_m_s / rate_rad_s - model.turn_radius_m();

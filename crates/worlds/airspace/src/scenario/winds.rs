@@ -343,10 +343,10 @@ impl Compiler<'_> {
                          wind would drive stored orbits apart or together";
             return error(cause, "set airspace.shield = \"off\", or leave out the wind");
         }
-        if is_shielded && field.varies_by_place() && world.disturbance.position_m > 0.0 {
+        if is_shielded && field.varies_by_place() && world.has_position_errors {
             let cause = "a wind that differs from place to place under the shield, and errors of position: nobody would \
                          know in which wind an airplane is";
-            let remedy = "leave out position_noise_m, give a wind that differs by altitude alone, or set airspace.shield \
+            let remedy = "leave out position_noise_m and nac_p, give a wind that differs by altitude alone, or set airspace.shield \
                           = \"off\"";
             return error(cause, remedy);
         }

@@ -3,8 +3,10 @@
 use serde::Deserialize;
 use serde_json::{Value, json};
 use sidestep_import::traffic::MAX_SPEED_M_S;
-use sidestep_scenario::{Number, Open, Rule, invalid_value, schema_by_hand};
+use sidestep_scenario::{Integer, Number, Open, Rule, invalid_value, schema_by_hand};
 
+/// A category of surveillance from 1 on: 0 stands for what is unknown.
+pub(crate) type SurveillanceCategory = Integer<1, 11>;
 /// A separation in meters.
 pub(crate) type SeparationM = Number<Open<0, 1_000_000>>;
 
