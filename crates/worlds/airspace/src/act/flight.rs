@@ -87,7 +87,7 @@ impl<'a> AircraftCycleMotion<'a> {
             FlightPathSource::Profile { segment, .. } => {
                 let InterOrderSegment { model, mission, .. } = segment;
                 let route = RoutePosition { mission, next, pose };
-                air.local_mission(frame, &model, route, world.timing.dt_s)
+                air.local_mission(frame, model, route, world.timing.dt_s)
             }
             FlightPathSource::Track(_) => Cow::default(),
         };

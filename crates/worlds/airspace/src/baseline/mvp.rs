@@ -259,13 +259,10 @@ impl MvpRules {
         // Who is to come out above: the one that is above now, or of two on one level the one with the smaller number.
         let is_upper = above_m < 0.0 || (above_m == 0.0 && own.slot < other.slot);
         let away = if is_upper { 1.0 } else { -1.0 };
-        let (shortfall_m, within_s) = if is_crossing && crosses_in_s <= self.settings.look_ahead_s {
-            (zone_m, crosses_in_s)
-        } else if closing_m_s == 0.0 {
-            (zone_m - above_m.abs(), enters_in_s)
-        } else {
-            (zone_m, enters_in_s)
-        };
+        let crosses_in_time = is_crossing && crosses_in_s <= self.settings.look_ahead_s;
+        let within_s = if crosses_in_time { crosses_in_s } else { enters_in_s };
+        let keeps_gap = closing_m_s == 0.0;
+        let shortfall_m = if keeps_gap { zone_m - above_m.abs() } else { zone_m };
         // One that need not give way leaves all to the other.
         let share = if other.yields { 0.5 } else { 1.0 };
         VerticalResolution { climb_m_s: share * away * shortfall_m / within_s, within_s }

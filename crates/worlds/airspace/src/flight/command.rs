@@ -105,6 +105,6 @@ impl SpeedFactors {
         }
         let from_m_s = (self.least * least_m_s).max(*flyable_m_s.start());
         let to_m_s = (self.largest * largest_m_s).min(*flyable_m_s.end());
-        (from_m_s <= to_m_s).then(|| from_m_s..=to_m_s)
+        (from_m_s <= to_m_s).then_some(from_m_s..=to_m_s)
     }
 }

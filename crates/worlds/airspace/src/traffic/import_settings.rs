@@ -132,13 +132,17 @@ impl ResolutionLimits {
     }
 
     fn resolution(self) -> Resolution {
-        match (self.heading, self.speed, self.vertical) {
-            (true, false, _) => Resolution::Heading,
-            (false, true, _) => Resolution::Speed,
-            (true, true, _) => Resolution::HeadingSpeed,
-            (false, false, true) => Resolution::Vertical,
+        if self.heading && self.speed {
+            Resolution::HeadingSpeed
+        } else if self.heading {
+            Resolution::Heading
+        } else if self.speed {
+            Resolution::Speed
+        } else if self.vertical {
+            Resolution::Vertical
+        } else {
             // Without any limit BlueSky changes everything.
-            (false, false, false) => Resolution::HeadingSpeedVertical,
+            Resolution::HeadingSpeedVertical
         }
     }
 }

@@ -127,8 +127,8 @@ impl SoloFlight<'_> {
         let frame = world.surface.frame_at(self.pose.at);
         let before = frame.pose_to_local(self.pose);
         let route = RoutePosition { mission, next: self.next, pose: before };
-        let mission = air.local_mission(frame, &model, route, world.timing.dtau_s);
-        let pilot = air.autopilot(&model, &mission);
+        let mission = air.local_mission(frame, model, route, world.timing.dtau_s);
+        let pilot = air.autopilot(model, &mission);
         let omega = air.steer(&pilot, before, self.next);
         let after = air.after_wind_step(before.step(model.v_m_s, omega, world.timing.dtau_s));
         let next = pilot.next_way_point((before, after), self.next);
