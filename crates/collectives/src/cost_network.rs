@@ -132,11 +132,11 @@ impl CostNetwork {
     pub(super) fn raise_bound(&mut self) -> f64 {
         let before = self.bound;
         let of_player = self.pairs_of_players();
-        for place in 0..self.players.len() {
-            self.visit(place, &of_player[place], Sweep::Forward);
+        for (place, pairs) in of_player.iter().enumerate() {
+            self.visit(place, pairs, Sweep::Forward);
         }
-        for place in (0..self.players.len()).rev() {
-            self.visit(place, &of_player[place], Sweep::Backward);
+        for (place, pairs) in of_player.iter().enumerate().rev() {
+            self.visit(place, pairs, Sweep::Backward);
         }
         self.bound - before
     }

@@ -152,6 +152,11 @@ fn levels(context: &PhaseContext<'_>, slot: EntitySlot) -> FlightLevelRange {
         for level in [airplane.limited_command(wish).level, in_force.level].into_iter().flatten() {
             levels = levels.extended_by_level(level.altitude_m);
         }
+        // What it may choose is of no use if those that are there are not considered.
+        let filed_m = world.segment(slot, done.into()).altitude_m;
+        for change_m in airplane.changes.levels_m.iter().filter(|_| world.changes.levels) {
+            levels = levels.extended_by_level(filed_m + change_m);
+        }
     }
     let orders = &world.airplanes[slot as usize].orders;
     let now_s = world.cycle_start_s(*now);

@@ -151,7 +151,7 @@ impl AirspaceWorld {
     pub(crate) fn has_holds(&self) -> bool {
         let is_level = |order: &FlightOrder| matches!(order.task, FlightTask::Altitude { .. });
         let changes_level = || self.airplanes.iter().any(|one| one.orders.iter().any(is_level));
-        self.shield && (self.safe_altitude_m.is_some() || changes_level())
+        self.shield && (self.safe_altitude_m.is_some() || changes_level() || self.has_commands())
     }
 
     /// Returns the call sign of an airplane, if it has one.

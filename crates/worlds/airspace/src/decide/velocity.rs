@@ -161,8 +161,7 @@ fn decide_steering(
             for (place, &k) in flying.iter().enumerate() {
                 let own = &view.all[place];
                 let others = view.others_seen_from(place);
-                let omega_max_rad_s =
-                    world.segment(group[k].slot, group[k].orders).model.omega_max_rad_s;
+                let omega_max_rad_s = world.known_segment(group[k]).model.omega_max_rad_s;
                 let heading_rad =
                     bands::heading_rad(own, others.iter(), world.bands, omega_max_rad_s);
                 steering[k] = heading_rad.into();
