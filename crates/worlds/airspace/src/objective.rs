@@ -69,8 +69,9 @@ impl Objective {
         let mut sums = [0.0; 2];
         let mut weight = 1.0;
         let slices = a.points[..end].chunks(SLICE).zip(b.points[..end].chunks(SLICE));
+        let terms = PairTerms { plane, r };
         for (of_a, of_b) in slices {
-            let parts = self.slice_collision_costs(plane, [of_a, of_b], weight, r, |_| true);
+            let parts = self.slice_collision_costs(terms, [of_a, of_b], weight, |_| true);
             sums[0] += parts[0];
             sums[1] += parts[1];
             weight = self.next_slice_weight(weight);
@@ -88,10 +89,9 @@ impl Objective {
     #[inline(always)]
     fn slice_collision_costs(
         &self,
-        plane: &PairPlane,
+        PairTerms { plane, r }: PairTerms<'_>,
         [a, b]: [&[Point]; 2],
         mut weight: f64,
-        r: [f64; 2],
         counts: impl Fn(usize) -> bool,
     ) -> [f64; 2] {
         let [ra, rb] = r.map(|r| r * self.inflation);
@@ -132,6 +132,14 @@ impl Objective {
             _ => 0.0,
         }
     }
+}
+
+/// What all slices of a pair have in common.
+#[derive(Debug, Clone, Copy)]
+struct PairTerms<'a> {
+    plane: &'a PairPlane,
+    /// The separations of the two, in meters.
+    r: [f64; 2],
 }
 
 /// Weight of a meter beyond a border against one of a lost separation: areas are to be kept clear of first.
@@ -495,6 +503,7 @@ fn pair_costs(
         return None;
     }
     let plane = PairPlane::between(a.frame, b.frame);
+    let terms = PairTerms { plane: &plane, r };
     let is_near = |p: &BoundingBox, q: &BoundingBox| match plane.motions() {
         None => p.is_within_gap(q, gap_m),
         Some([first, second]) => p.moved(first).is_within_gap(&q.moved(second), gap_m),
@@ -516,9 +525,9 @@ fn pair_costs(
                         let levels = a.step_levels(p.actions[0], step);
                         levels.overlaps(&b.step_levels(q.actions[0], step), objective.vertical_m)
                     };
-                    objective.slice_collision_costs(&plane, [of_p, of_q], weight, r, meets)
+                    objective.slice_collision_costs(terms, [of_p, of_q], weight, meets)
                 } else {
-                    objective.slice_collision_costs(&plane, [of_p, of_q], weight, r, |_| true)
+                    objective.slice_collision_costs(terms, [of_p, of_q], weight, |_| true)
                 };
                 if parts != [0.0; 2] {
                     // Most pairs never need the table, which is large.
