@@ -321,7 +321,7 @@ def test_games_that_are_none_are_errors(options, words):
 def test_the_words_of_an_argument_are_those_of_its_type(name, kind, urdf):
     function = {"ik": sidestep.ik, "minimize": collectives.minimize}[kind]
     given = {"ik": {"arm": urdf, "targets": [0, 0, 1]}, "minimize": {"own": [[0.0, 1.0]]}}[kind]
-    words = [word for word in re.findall(r"\w+", str(inspect.signature(function).parameters[name].annotation))]
+    words = [word for word in re.findall(r"[\w-]+", str(inspect.signature(function).parameters[name].annotation))]
     words = [word for word in words if word not in ("Literal", "None")]
     with pytest.raises(sidestep.InputError) as caught:
         function(**given, **{name: "no such word"})
