@@ -5,6 +5,7 @@
 use super::{AirspaceSection, CompiledAirspace, ModelSection};
 use crate::flight::{AirplaneStart, FlightTask, TurnLimit};
 use crate::method::MethodKind;
+use crate::settings::Combinations;
 use sidestep_scenario::Remark;
 
 /// Returns the remarks on a scenario, in the order of its keys.
@@ -56,6 +57,9 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     if section.look_every_s.is_some() && section.legs.is_none() && !looks_anew(compiled) {
         note("look_every_s", "it is for scenarios that fly by mvp, orca, bands or none alone");
     }
+    for (key, because) in effectless_changes(compiled) {
+        note(key, because);
+    }
     for key in keys_of_pairs(section) {
         note(key, "measures.pairs is \"off\"");
     }
@@ -93,9 +97,32 @@ fn min_altitude_m(airplane: &AirplaneStart) -> f64 {
     })
 }
 
+/// Returns the keys of changes of level and speed that nobody chooses among, and why.
+fn effectless_changes(compiled: &CompiledAirspace) -> Vec<(&'static str, &'static str)> {
+    let section = &compiled.recipe.file.airspace;
+    let world = &compiled.world;
+    if !world.changes.is_none() {
+        return Vec::new();
+    }
+    let has_changes = world.airplanes.iter().any(|airplane| !airplane.changes.is_empty());
+    let because = if has_changes {
+        "no airplane avoids others by method pc"
+    } else {
+        "no airplane has level_changes_m or speed_changes_m_s"
+    };
+    let given = [
+        ("combinations", section.combinations == Combinations::All),
+        ("level_weight", section.level_weight.is_some()),
+        ("speed_weight", section.speed_weight.is_some()),
+    ];
+    let keys = given.into_iter().filter(|(_, is_given)| *is_given);
+    keys.map(|(key, _)| (key, because)).collect()
+}
+
 /// Returns the remarks on limits for all airplanes that no airplane comes near.
 fn effectless_limits(compiled: &CompiledAirspace) -> Vec<Remark> {
-    let airplanes = &compiled.world.airplanes;
+    let world = &compiled.world;
+    let airplanes = &world.airplanes;
     let keys = compiled.recipe.file.airplane.as_ref().map(ModelSection::abilities);
     let keys = keys.unwrap_or_default();
     let orders = || airplanes.iter().flat_map(|airplane| &airplane.orders);
@@ -109,6 +136,7 @@ fn effectless_limits(compiled: &CompiledAirspace) -> Vec<Remark> {
         let TurnLimit { omega_max_rad_s, lateral_m_s2 } = airplane.performance.turn;
         airplane.planned_speeds_m_s().all(|v_m_s| lateral_m_s2 / v_m_s < omega_max_rad_s)
     });
+    let no_choice = "no airplane avoids others by method pc";
     let no_speed = "no airplane is ordered to another speed";
     let no_level = "no airplane is ordered to another level";
     let all = [
@@ -116,6 +144,16 @@ fn effectless_limits(compiled: &CompiledAirspace) -> Vec<Remark> {
             "omega_max_deg_s",
             keys.omega_max_deg_s.is_some() && bank_holds,
             "the bank limits all turns more",
+        ),
+        (
+            "level_changes_m",
+            world.changes.is_none() && airplanes.iter().any(|a| !a.changes.levels_m.is_empty()),
+            no_choice,
+        ),
+        (
+            "speed_changes_m_s",
+            world.changes.is_none() && airplanes.iter().any(|a| !a.changes.speeds_m_s.is_empty()),
+            no_choice,
         ),
         ("acceleration_m_s2", keys.acceleration_m_s2.is_some() && !changes_speed, no_speed),
         ("climb_max_m_s", keys.climb_max_m_s.is_some() && !changes_level, no_level),
@@ -197,6 +235,20 @@ mod tests {
         );
         let compiled = CompiledAirspace::new(&Source::new("test", text, "")).expect("a scenario");
         effectless_remarks(&compiled).into_iter().map(|remark| remark.key).collect()
+    }
+
+    #[test]
+    fn changes_of_level_and_speed_that_nobody_chooses_among_are_named() {
+        let weights = "combinations = \"all\"\nlevel_weight = 2.0\nspeed_weight = 1.0\n";
+        let of_weights = ["combinations", "level_weight", "speed_weight"];
+        let of_weights = of_weights.map(|key| format!("airspace.{key}"));
+        assert_eq!(remarks(weights), of_weights);
+        let changes = "[airplane]\nlevel_changes_m = [300.0]\nspeed_changes_m_s = [-3.0]\n";
+        assert_eq!(remarks(&format!("{weights}{changes}")), [""; 0]);
+        let by_mvp = remarks(&format!("method = \"mvp\"\n{weights}{changes}"));
+        let of_changes = ["airplane.level_changes_m", "airplane.speed_changes_m_s"];
+        assert_eq!(by_mvp[..3], of_weights);
+        assert_eq!(by_mvp[3..], of_changes);
     }
 
     #[test]
