@@ -18,7 +18,7 @@ pub struct Minimum {
 /// The share of the cost by which a joint move has to be cheaper than the best one so far: less is rounding.
 const MIN_SAVED_SHARE: f64 = 1e-9;
 
-/// Sweeps that raise the bound at the start. In games of airplanes later ones gain next to nothing.
+/// Sweeps that raise the bound at the start, at most: they end where one gains little.
 const ROOT_SWEEPS: u32 = 100;
 /// Sweeps after each choice.
 const NODE_SWEEPS: u32 = 2;
@@ -36,12 +36,12 @@ pub fn find_minimum(game: &PairwiseGame, start: &[usize], max_nodes: u64) -> Min
 }
 
 /// Returns a lower bound on the cost of every joint move, which is dearer to compute than
-/// [`PairwiseGame::lower_bound`] and hardly ever lower. `joint` is a joint move (shape: players), the cheaper the better.
+/// [`PairwiseGame::lower_bound`] and not lower. `joint` is a joint move (shape: players), the cheaper the better.
 pub fn tight_lower_bound(game: &PairwiseGame, joint: &[usize]) -> f64 {
     let cost = game.cost(joint);
     let mut network = CostNetwork::new(game, cost);
     raise_bound(&mut network, cost, ROOT_SWEEPS);
-    network.bound.min(cost)
+    network.bound.max(game.lower_bound()).min(cost)
 }
 
 /// Raises the bound of a network in up to `sweeps` sweeps, as long as they close the gap to `least`.

@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::interrupt;
 
-/// Largest number of partial joint moves that branch and bound looks at. Nine of ten games of twenty airplanes need fewer
-/// than a hundred; so many take about 50 ms.
+/// Largest number of partial joint moves that branch and bound looks at: about 50 ms. Nine of ten random games of twenty
+/// airplanes are solved in 4 ms.
 const MAX_NODES: u64 = 10_000;
 
 /// The estimator of `E[G | x_i]`.

@@ -272,8 +272,8 @@ pub(super) fn decide_centrally(
     decide_by_predictions(world, &ids, &options, now).into_iter().map(Some).collect()
 }
 
-/// Largest number of partial joint actions that the search for a true minimum looks at: about 50 ms. In a hundred random
-/// games of up to twenty airplanes one takes longer.
+/// Largest number of partial joint actions that the search for a true minimum looks at: about 50 ms, which hardly any
+/// random game of up to twenty airplanes takes.
 const MAX_MINIMUM_NODES: u64 = 10_000;
 
 /// The objective of a joint action of a group, and its true minimum.
