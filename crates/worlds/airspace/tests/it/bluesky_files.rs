@@ -8,9 +8,7 @@
 //! `../shared/data/airspace/bluesky` are flown. SIDESTEP_BLUESKY_TABLE names a file for the rows of files, beside which
 //! those of aircraft are written, and SIDESTEP_BLUESKY_FLOWN one that keeps what BlueSky has flown for the next time.
 
-mod bluesky_flights;
-
-use bluesky_flights::{FlownFile, OwnFlight, bluesky_flights, bluesky_navdata, own_flight};
+use crate::bluesky_flights::{FlownFile, OwnFlight, bluesky_flights, bluesky_navdata, own_flight};
 use sidestep_airspace::traffic::from_bluesky;
 use sidestep_import::bluesky::{
     NavigationData, ResolutionMethod, ScnFile, Setting, read_with_places,

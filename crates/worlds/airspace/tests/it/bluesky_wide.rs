@@ -7,9 +7,7 @@
 //! differently a reference for geodesics on the ellipsoid decides, from which no closest approach here differs by more
 //! than 1 % of the zone: it looks once per second, and so misses the nearest instant of a head-on pass.
 
-mod bluesky_flights;
-
-use bluesky_flights::{FlownFile, bluesky_flights, bluesky_navdata, own_flight};
+use crate::bluesky_flights::{FlownFile, bluesky_flights, bluesky_navdata, own_flight};
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 use sidestep_airspace::traffic::from_bluesky;
 use sidestep_import::bluesky::{Airspeed, parse};

@@ -1,7 +1,5 @@
 //! Flights in BlueSky 1.1.1, and the same ones here. BlueSky flies in the interpreter of SIDESTEP_PYTHON, else `python3`.
 
-#![allow(dead_code, reason = "each test reads its own part of what was flown")]
-
 use serde::Deserialize;
 use serde_json::json;
 use sidestep_airspace::state::FlightEnd;

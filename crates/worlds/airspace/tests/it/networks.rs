@@ -36,5 +36,5 @@ fn the_golden_digests_of_agents_are_what_every_machine_gets() {
             }
         }
     }
-    assert_eq!(found, include_str!("golden/networks.txt"), "found:\n{found}");
+    assert_eq!(found, include_str!("../golden/networks.txt"), "found:\n{found}");
 }
