@@ -96,13 +96,17 @@ impl Objective {
     ) -> [f64; 2] {
         let [ra, rb] = r.map(|r| r * self.inflation);
         let max_square_m2 = ra.max(rb) * ra.max(rb);
+        let squares_m2 = plane.squared_distances_m2::<SLICE>(a, b);
+        // Nearly all points are farther apart than that, and need neither weight nor root. No early exit: all of them are
+        // compared at once.
+        let is_any_near = squares_m2
+            .iter()
+            .fold(false, |is_any, square_m2| is_any | (*square_m2 < max_square_m2));
         let mut sums = [0.0; 2];
-        for (k, (p, q)) in a.iter().zip(b).enumerate() {
-            let [p, q] = plane.points(*p, *q);
-            let dx = p[0] - q[0];
-            let dy = p[1] - q[1];
-            let square_m2 = dx * dx + dy * dy;
-            // Nearly all points are farther apart than that, and need no root.
+        if !is_any_near {
+            return sums;
+        }
+        for (k, square_m2) in squares_m2.into_iter().enumerate() {
             if square_m2 < max_square_m2 && counts(k) {
                 let distance_m = square_m2.sqrt();
                 let shortfall_a_m = (ra - distance_m).max(0.0);
@@ -512,10 +516,17 @@ fn pair_costs(
     let has_changes = a.changes.is_some() || b.changes.is_some();
     let mut costs = None;
     let mut weight = 1.0;
+    let mut slice_of_weight = 0;
     for (k, (of_a, of_b)) in a.slices.iter().zip(&b.slices).enumerate() {
-        let are_all_far = !is_near(&of_a.all, &of_b.all);
-        let rows = of_a.pieces.iter().filter(|_| !are_all_far);
-        for p in rows.filter(|p| is_near(&p.bounds, &of_b.all)) {
+        if !is_near(&of_a.all, &of_b.all) {
+            continue;
+        }
+        // Only now, because most pairs are far from each other in all slices.
+        while slice_of_weight < k {
+            weight = objective.next_slice_weight(weight);
+            slice_of_weight += 1;
+        }
+        for p in of_a.pieces.iter().filter(|p| is_near(&p.bounds, &of_b.all)) {
             let of_p = a.piece_points(p, k * SLICE, objective.mask);
             for q in of_b.pieces.iter().filter(|q| is_near(&p.bounds, &q.bounds)) {
                 let of_q = b.piece_points(q, k * SLICE, objective.mask);
@@ -537,7 +548,6 @@ fn pair_costs(
                 }
             }
         }
-        weight = objective.next_slice_weight(weight);
     }
     costs
 }

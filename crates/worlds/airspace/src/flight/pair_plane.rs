@@ -82,6 +82,33 @@ impl PairPlane {
         }
     }
 
+    /// Returns the squares of the distances in square meters between at most `N` points of the first frame and as many of
+    /// the second; infinite beyond the last of either.
+    #[inline]
+    pub(crate) fn squared_distances_m2<const N: usize>(
+        &self,
+        a: &[Point],
+        b: &[Point],
+    ) -> [f64; N] {
+        let mut squares_m2 = [f64::INFINITY; N];
+        let pairs = squares_m2.iter_mut().zip(a.iter().zip(b));
+        let square_m2 = |p: Point, q: Point| {
+            let dx = p[0] - q[0];
+            let dy = p[1] - q[1];
+            dx * dx + dy * dy
+        };
+        // One decision for all points, so that the loops are vectorized.
+        match &self.0 {
+            None => pairs.for_each(|(square, (p, q))| *square = square_m2(*p, *q)),
+            Some([first, second]) => {
+                pairs.for_each(|(square, (p, q))| {
+                    *square = square_m2(first.point(*p), second.point(*q))
+                });
+            }
+        }
+        squares_m2
+    }
+
     /// Returns the distance between a point of the first frame and one of the second.
     #[inline]
     pub fn distance_m(&self, p: Point, q: Point) -> f64 {
