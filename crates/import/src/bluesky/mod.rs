@@ -41,8 +41,9 @@ pub use navdata::NavigationData;
 pub use options::{ScnOptions, UnusedCommand};
 pub use speed::{Airspeed, FOOT_M, KNOT_MPS};
 pub use traffic::{
-    AircraftCommand, AircraftSetting, HorizontalResolution, PositionRef, ResolutionMethod,
-    ScnAircraft, Setting, TimedSetting, Traffic, UnplacedAircraft, WayPoint, Wind,
+    AircraftCommand, AircraftSetting, HorizontalResolution, PositionRef, PriorityRule,
+    ResolutionMethod, ScnAircraft, Setting, TimedSetting, Traffic, UnplacedAircraft, WayPoint,
+    Wind,
 };
 
 use super::report::ImportReport;

@@ -219,13 +219,42 @@ fn winds_come_and_go() {
 fn limits_of_resolutions_that_are_not_flown_are_named() {
     let file = scenario(
         "RMETHH HDG;RMETHV OFF;PRIORULES OFF;PRIORULES ON FF1
-        RMETHH UP;RMETHV DOWN;PRIORULES ON FF2;CRE A B744 0 0 0 0 100;DTLOOK 20 A",
+        RMETHH UP;RMETHV DOWN;PRIORULES FF2;CRE A B744 0 0 0 0 100;DTLOOK 20 A",
     );
     let expected =
         [("RMETHH UP", 1), ("RMETHV DOWN", 1), ("PRIORULES FF2", 1), ("DTLOOK aircraft", 1)];
     assert_eq!(file.not_understood, counts(&expected));
     assert!(file.unused.iter().all(|one| one.place == "line 2" && !one.reason.is_empty()));
     assert_eq!(file.unused.len(), 4);
+}
+
+#[test]
+fn rules_of_priority_are_settings_and_told_where_bluesky_keeps_or_forgets_them() {
+    let file = good(
+        "RESO MVP;PRIORULES ON FF1;PRIORULES ON FF2;PRIORULES ON FF3;PRIORULES ON LAY1;PRIORULES 1 lay2",
+    );
+    let expected = [
+        (0.0, "RESO", Setting::Resolution(ResolutionMethod::Mvp)),
+        (0.0, "PRIORULES", Setting::PriorityRule(PriorityRule::Both)),
+        (0.0, "PRIORULES", Setting::PriorityRule(PriorityRule::CruisingFirst)),
+        (0.0, "PRIORULES", Setting::PriorityRule(PriorityRule::ClimbingFirst)),
+        (0.0, "PRIORULES", Setting::PriorityRule(PriorityRule::CruisingFirstHorizontal)),
+        (0.0, "PRIORULES", Setting::PriorityRule(PriorityRule::ClimbingFirstHorizontal)),
+    ];
+    assert_eq!(settings(&file), expected);
+    for (commands, told) in [
+        ("RESO MVP;PRIORULES ON FF2;PRIORULES ON FF1", None),
+        ("RESO MVP;PRIORULES OFF", None),
+        ("RESO MVP;PRIORULES ON FF2;PRIORULES OFF", Some("PRIORULES OFF: off")),
+        ("PRIORULES ON FF2;RESO MVP", Some("PRIORULES before RESO MVP: kept")),
+        ("PRIORULES ON FF2;RESET;RESO MVP", None),
+    ] {
+        let file = scenario(commands);
+        let rules = file.report.findings.iter().filter(|found| found.rule.contains("PRIORULES"));
+        let rules: Vec<&str> = rules.map(|found| &*found.rule).collect();
+        assert_eq!(rules.len(), usize::from(told.is_some()), "{commands}: {rules:?}");
+        assert!(told.is_none_or(|told| rules[0].contains(told)), "{commands}: {rules:?}");
+    }
 }
 
 #[test]

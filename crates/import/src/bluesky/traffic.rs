@@ -53,6 +53,8 @@ pub enum Setting {
     VerticalResolution(bool),
     /// The factor on the zone's height to which conflicts are resolved in the vertical (`RFACV`); 1.01 unless given.
     VerticalResolutionFactor(f64),
+    /// Who resolves a conflict by MVP (`PRIORULES`).
+    PriorityRule(PriorityRule),
     /// A further wind at a place (`WIND`).
     AddedWind(Wind),
     /// The end of all winds (`DEL WIND`).
@@ -96,6 +98,21 @@ pub enum HorizontalResolution {
     Heading,
     /// No limit in the horizontal: without one in the vertical everything, else vertical speeds.
     Off,
+}
+
+/// Who resolves a conflict by MVP.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PriorityRule {
+    /// Both (`FF1`, and without a rule).
+    Both,
+    /// One that climbs or descends, beside one that cruises (`FF2`).
+    CruisingFirst,
+    /// One that cruises, beside one that climbs or descends: in the horizontal (`FF3`).
+    ClimbingFirst,
+    /// As `CruisingFirst`, and all in the horizontal (`LAY1`).
+    CruisingFirstHorizontal,
+    /// As `ClimbingFirst`, and all in the horizontal (`LAY2`).
+    ClimbingFirstHorizontal,
 }
 
 /// The wind at a place.

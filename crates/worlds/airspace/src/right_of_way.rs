@@ -10,10 +10,18 @@
 //!
 //! An airplane of a higher priority has right of way over all of a lower one. Between others it follows from the rules of
 //! the air where the scenario asks for them (ICAO Annex 2, 3.2.2): of two that converge the one that has the other on
-//! its right gives way; one that overtakes gives way; of two head-on neither has right of way. It follows from what all see, so
+//! its right gives way; one that overtakes gives way; of two head-on neither has right of way. Or it follows from phases of
+//! flight, as with `PRIORULES` of BlueSky: those that cruise have right of way over those that climb or descend, or the
+//! other way round, and of two in one phase neither has. It follows from what all see and what is filed, so
 //! all agree on it without a word. `decide/deviation_weights.rs` has the weights of `pc`.
+//!
+//! By phases, the rules of BlueSky 1.1.1 decide on the vertical part of a resolution by `mvp`, too
+//! ([`RightOfWayRule::vertical_share`]). An airplane that has right of way flies its plan here; there it keeps its
+//! track, speed and vertical speed for as long as the conflict lasts.
 
 use crate::baseline::AircraftState;
+use crate::flight::{AirplaneStart, FlightOrder, FlightTask, KnownAircraft};
+use crate::flight_plan::CLIMB_M_S;
 use crate::settings::RightOfWayRule;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::EntitySlot;
@@ -27,6 +35,9 @@ const MAX_OVERTAKING_RAD: f64 = 70.0 * PI / 180.0;
 /// Two whose headings differ from opposite ones by less are head-on, in radians. The rules say "approximately"; 20
 /// degrees is our choice.
 const MAX_HEAD_ON_RAD: f64 = 20.0 * PI / 180.0;
+
+/// Vertical speed in meters per second below which an airplane cruises; else it climbs or descends. BlueSky's value.
+const MAX_CRUISE_CLIMB_M_S: f64 = 0.1;
 
 /// Which of two airplanes gives way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +59,59 @@ impl Yielding {
             Self::Both => Self::Both,
         }
     }
+
+    /// Returns the second airplane as the first one has to mind it: not at all if it gives way, and as one that does not
+    /// give way if it has right of way.
+    pub(crate) fn as_minded(self, second: AircraftState) -> Option<AircraftState> {
+        match self {
+            Self::First => Some(AircraftState { yields: false, ..second }),
+            Self::Second => None,
+            Self::Both => Some(second),
+        }
+    }
+}
+
+impl RightOfWayRule {
+    /// Returns which of two airplanes gives way, each as it is seen in one plane.
+    fn yielding(self, first: &AircraftState, second: &AircraftState) -> Yielding {
+        match self {
+            Self::None => Yielding::Both,
+            Self::RulesOfTheAir => rules_of_the_air(first, second),
+            Self::CruisingFirst | Self::CruisingFirstHorizontal => cruising_first(first, second),
+            Self::ClimbingFirst | Self::ClimbingFirstHorizontal => {
+                cruising_first(first, second).swapped()
+            }
+        }
+    }
+
+    /// Returns the part of the vertical change that resolves a conflict which an airplane flies by `mvp`. In BlueSky it is
+    /// half of it, also beside one that has right of way, or nothing; without a rule by phases one flies all of it beside
+    /// another one that does not give way.
+    pub(crate) fn vertical_share(self, own: &AircraftState, other: &AircraftState) -> f64 {
+        let share = if other.yields { 0.5 } else { 1.0 };
+        let gives_way = self.yielding(own, other) == Yielding::First;
+        match self {
+            Self::None | Self::RulesOfTheAir => share,
+            Self::CruisingFirst if gives_way => 0.5,
+            Self::ClimbingFirst if gives_way => 0.0,
+            Self::CruisingFirst | Self::ClimbingFirst => share,
+            Self::CruisingFirstHorizontal | Self::ClimbingFirstHorizontal => 0.0,
+        }
+    }
+}
+
+/// Returns which of two airplanes gives way if those that cruise have right of way.
+fn cruising_first(first: &AircraftState, second: &AircraftState) -> Yielding {
+    match [is_cruising(first), is_cruising(second)] {
+        [true, false] => Yielding::Second,
+        [false, true] => Yielding::First,
+        _ => Yielding::Both,
+    }
+}
+
+/// Returns whether an airplane neither climbs nor descends.
+fn is_cruising(one: &AircraftState) -> bool {
+    one.climb_m_s.abs() < MAX_CRUISE_CLIMB_M_S
 }
 
 /// Returns which of two airplanes gives way by the rules of the air, each as it is seen in one plane.
@@ -94,11 +158,21 @@ impl AirspaceWorld {
         match a.cmp(&b) {
             std::cmp::Ordering::Less => Yielding::First,
             std::cmp::Ordering::Greater => Yielding::Second,
-            std::cmp::Ordering::Equal => match self.right_of_way {
-                RightOfWayRule::None => Yielding::Both,
-                RightOfWayRule::RulesOfTheAir => rules_of_the_air(first, second),
-            },
+            std::cmp::Ordering::Equal => self.right_of_way.yielding(first, second),
         }
+    }
+
+    /// Returns the rate of climb of an airplane in meters per second, as far as its altitude and its filed levels say: 0 on
+    /// one of these. Which orders it has carried out nobody has to know for that.
+    pub(crate) fn filed_climb_m_s(&self, known: KnownAircraft) -> f64 {
+        if known.command.level.is_some() {
+            return self.known_segment(known).signed_climb_m_s(known.altitude_m);
+        }
+        let AirplaneStart { altitude_m, orders, .. } = &self.airplanes[known.slot as usize];
+        let is_order_to_level = |order: &FlightOrder| matches!(order.task, FlightTask::Altitude { altitude_m, .. } if altitude_m == known.altitude_m);
+        let is_on_filed_level =
+            known.altitude_m == *altitude_m || orders.iter().any(is_order_to_level);
+        if is_on_filed_level { 0.0 } else { CLIMB_M_S }
     }
 
     /// Returns the priority of an airplane.
@@ -113,6 +187,9 @@ impl AirspaceWorld {
             || self.airplanes.iter().any(|airplane| Some(airplane.priority) != first)
     }
 }
+
+#[cfg(test)]
+mod bluesky_tests;
 
 #[cfg(test)]
 mod tests {

@@ -84,6 +84,33 @@ pub enum RightOfWayRule {
     None,
     /// Of two that converge the one that has the other on its right gives way, and one that overtakes does.
     RulesOfTheAir,
+    /// Who climbs or descends gives way to one that cruises (`PRIORULES ON FF2` of BlueSky).
+    CruisingFirst,
+    /// Who cruises gives way to one that climbs or descends, and keeps its level (FF3).
+    ClimbingFirst,
+    /// As cruising-first, and mvp resolves no conflict by levels (LAY1).
+    CruisingFirstHorizontal,
+    /// As climbing-first, and mvp resolves no conflict by levels (LAY2).
+    ClimbingFirstHorizontal,
+}
+
+impl RightOfWayRule {
+    /// Returns its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::RulesOfTheAir => "rules-of-the-air",
+            Self::CruisingFirst => "cruising-first",
+            Self::ClimbingFirst => "climbing-first",
+            Self::CruisingFirstHorizontal => "cruising-first-horizontal",
+            Self::ClimbingFirstHorizontal => "climbing-first-horizontal",
+        }
+    }
+
+    /// Returns whether mvp resolves conflicts in the horizontal alone under it.
+    pub(crate) fn is_horizontal(self) -> bool {
+        matches!(self, Self::CruisingFirstHorizontal | Self::ClimbingFirstHorizontal)
+    }
 }
 
 /// The settings of a method.

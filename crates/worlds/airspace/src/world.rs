@@ -562,6 +562,7 @@ impl AirspaceWorld {
             settings: self.mvp,
             resolution: self.mvp_resolution,
             vertical_m: self.vertical_m,
+            right_of_way: self.right_of_way,
         }
     }
 

@@ -4,7 +4,8 @@ use super::{
     CommandError, CommandOutcome, CommandResult, Interpreter, canonical_name, refusal, upper,
 };
 use crate::bluesky::traffic::{
-    AircraftSetting, HorizontalResolution, ResolutionMethod, Setting, TimedSetting, Wind,
+    AircraftSetting, HorizontalResolution, PriorityRule, ResolutionMethod, Setting, TimedSetting,
+    Wind,
 };
 use crate::bluesky::values::{
     Arguments, ZONE_HALF_HEIGHTS_FT, ZONE_RADII_NM, altitude_ft, duration_s, heading_deg, number,
@@ -24,6 +25,8 @@ pub(super) struct SettingDefaults {
     detects: bool,
     /// Whether sizes of zones or a look-ahead are given.
     has_zones: bool,
+    /// Whether some conflicts are resolved by one airplane alone.
+    has_priority_rule: bool,
 }
 
 impl Default for SettingDefaults {
@@ -34,6 +37,7 @@ impl Default for SettingDefaults {
             has_wind: false,
             detects: false,
             has_zones: false,
+            has_priority_rule: false,
         }
     }
 }
@@ -55,7 +59,14 @@ impl Interpreter {
     pub(super) fn add_setting(&mut self, command: &'static str, setting: Setting) {
         match setting {
             Setting::AddedWind(_) => self.defaults.has_wind = true,
-            Setting::NoWind | Setting::Reset => self.defaults.has_wind = false,
+            Setting::NoWind => self.defaults.has_wind = false,
+            Setting::Reset => {
+                self.defaults.has_wind = false;
+                self.defaults.has_priority_rule = false;
+            }
+            Setting::PriorityRule(rule) => {
+                self.defaults.has_priority_rule = rule != PriorityRule::Both;
+            }
             Setting::ZoneRadiusNm(_) | Setting::ZoneHalfHeightFt(_) | Setting::LookAheadS(_) => {
                 self.defaults.has_zones = true;
             }
@@ -135,6 +146,7 @@ impl Interpreter {
             "RESO" => {
                 let method = resolution(arguments, value)?;
                 if method == ResolutionMethod::Mvp {
+                    self.note_early_priority_rule();
                     self.mvp_place.get_or_insert(self.place.clone());
                 }
                 self.add_setting("RESO", Setting::Resolution(method));
@@ -162,7 +174,7 @@ impl Interpreter {
             }
             "RMETHH" => return Ok(self.limit_horizontal_resolution(value)),
             "RMETHV" => return Ok(self.limit_vertical_resolution(value)),
-            "PRIORULES" => return Ok(priority_rules(arguments, value)),
+            "PRIORULES" => return Ok(self.set_priority_rule(arguments, value)),
             "NOISE" => {
                 let is_on = on_off(place, value)?;
                 self.add_setting("NOISE", Setting::Noise(is_on));
@@ -175,6 +187,14 @@ impl Interpreter {
             }
         }
         Ok(CommandOutcome::Done)
+    }
+
+    /// Names a rule of priority that BlueSky forgets: it stays with the method before.
+    fn note_early_priority_rule(&mut self) {
+        if self.mvp_place.is_none() && self.defaults.has_priority_rule {
+            let rule = "PRIORULES before RESO MVP: kept; BlueSky 1.1.1 forgets it";
+            self.note(Treatment::Guessed, rule, "write RESO MVP in front of it");
+        }
     }
 
     /// `RMETHH`: what MVP changes in the horizontal.
@@ -210,6 +230,35 @@ impl Interpreter {
         CommandOutcome::Done
     }
 
+    /// `PRIORULES ON code`, or `PRIORULES OFF`. In BlueSky 1.1.1 a code switches the rule on, whatever is before it, and without
+    /// a code MVP refuses the command.
+    fn set_priority_rule(&mut self, arguments: &mut Arguments, value: Token) -> CommandOutcome {
+        let switch = upper(value);
+        let code = arguments.next().map(upper).unwrap_or_default();
+        if ["OFF", "FALSE", "NO", "0"].contains(&&*switch) {
+            if self.defaults.has_priority_rule {
+                let rule = "PRIORULES OFF: off; BlueSky 1.1.1 keeps the rule";
+                self.note(Treatment::Guessed, rule, "write PRIORULES ON FF1");
+            }
+            self.add_setting("PRIORULES", Setting::PriorityRule(PriorityRule::Both));
+            return CommandOutcome::Done;
+        }
+        let is_on = ["ON", "TRUE", "YES", "1"].contains(&&*switch);
+        let rule = match code.as_str() {
+            "FF1" => PriorityRule::Both,
+            "FF2" => PriorityRule::CruisingFirst,
+            "FF3" => PriorityRule::ClimbingFirst,
+            "LAY1" => PriorityRule::CruisingFirstHorizontal,
+            "LAY2" => PriorityRule::ClimbingFirstHorizontal,
+            _ => return unknown_priority_rule(&switch, &code),
+        };
+        if !is_on {
+            return unknown_priority_rule(&switch, &code);
+        }
+        self.add_setting("PRIORULES", Setting::PriorityRule(rule));
+        CommandOutcome::Done
+    }
+
     /// `WIND place,direction,speed`, or `WIND place` followed by `altitude,direction,speed` for
     /// each altitude, where the altitude may be left out.
     pub(super) fn add_wind(&mut self, arguments: &mut Arguments) -> CommandResult {
@@ -241,15 +290,9 @@ impl Interpreter {
     }
 }
 
-/// `PRIORULES OFF` and `ON FF1` are cooperative, as MVP is here; all else is named.
-fn priority_rules(arguments: &mut Arguments, value: Token) -> CommandOutcome {
-    let code = arguments.next().map(upper).unwrap_or_default();
-    let is_off = ["OFF", "FALSE", "NO", "0"].contains(&&*upper(value));
-    if is_off || code == "FF1" {
-        return CommandOutcome::Done;
-    }
-    let reason = "priorities are not known here: in each conflict both give way, as with FF1";
-    CommandOutcome::NotUnderstood(format!("PRIORULES {code}"), reason)
+fn unknown_priority_rule(switch: &str, code: &str) -> CommandOutcome {
+    let reason = "write PRIORULES ON FF1, FF2, FF3, LAY1 or LAY2";
+    CommandOutcome::NotUnderstood(format!("PRIORULES {switch} {code}").trim_end().into(), reason)
 }
 
 fn resolution(arguments: &Arguments, word: Token) -> Result<ResolutionMethod, CommandError> {

@@ -19,7 +19,7 @@
 
 use super::{AircraftState, vector_length};
 use crate::flight::{CommandKinds, Point, SpeedFactors};
-use crate::settings::{ReactiveSettings, Resolution as Axes};
+use crate::settings::{ReactiveSettings, Resolution as Axes, RightOfWayRule};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::geometry::{dot, sub};
 use sidestep_kernel::{EntitySlot, math};
@@ -100,6 +100,8 @@ pub(crate) struct MvpRules {
     pub(crate) resolution: ResolutionSettings,
     /// Height between levels that is enough, in meters.
     pub(crate) vertical_m: f64,
+    /// The rule that says who resolves a conflict, and whether in the vertical.
+    pub(crate) right_of_way: RightOfWayRule,
 }
 
 /// What an airplane flies to resolve its conflicts.
@@ -228,15 +230,18 @@ impl MvpRules {
         let mut climb_m_s = own.climb_m_s;
         let mut within_s = f64::INFINITY;
         for (other, closest) in conflicts {
-            let change = self.vertical_change(own, other, closest);
-            climb_m_s += change.climb_m_s;
-            within_s = within_s.min(change.within_s);
+            let share = self.right_of_way.vertical_share(own, other);
+            if share > 0.0 {
+                let change = self.vertical_change(own, other, closest);
+                climb_m_s += share * change.climb_m_s;
+                within_s = within_s.min(change.within_s);
+            }
         }
-        Some(VerticalResolution { climb_m_s, within_s })
+        // Without any it keeps to its level, which a rate without a time would not say.
+        within_s.is_finite().then_some(VerticalResolution { climb_m_s, within_s })
     }
 
-    /// Returns an airplane's change of vertical speed by one conflict, half of what resolves it if the other gives way, too,
-    /// and the time that this takes.
+    /// Returns the change of vertical speed by which an airplane alone resolves a conflict, and the time that this takes.
     fn vertical_change(
         &self,
         own: &AircraftState,
@@ -263,9 +268,7 @@ impl MvpRules {
         let within_s = if crosses_in_time { crosses_in_s } else { enters_in_s };
         let keeps_gap = closing_m_s == 0.0;
         let shortfall_m = if keeps_gap { zone_m - above_m.abs() } else { zone_m };
-        // One that need not give way leaves all to the other.
-        let share = if other.yields { 0.5 } else { 1.0 };
-        VerticalResolution { climb_m_s: share * away * shortfall_m / within_s, within_s }
+        VerticalResolution { climb_m_s: away * shortfall_m / within_s, within_s }
     }
 }
 
@@ -424,7 +427,8 @@ mod tests {
         let speeds = SpeedFactors { least: 0.5, largest: 2.0 };
         let resolution =
             ResolutionSettings { resolution, vertical_factor: 1.05, vertical_lead_s: 0.0, speeds };
-        MvpRules { settings: SETTINGS, resolution, vertical_m: 300.0 }
+        let right_of_way = RightOfWayRule::None;
+        MvpRules { settings: SETTINGS, resolution, vertical_m: 300.0, right_of_way }
     }
 
     fn looked(all: &[AircraftState], memory: &mut [ActiveResolutions]) -> Vec<Option<f64>> {

@@ -13,7 +13,7 @@ const DEVIATION_WEIGHT: f64 = 100.0;
 impl AirspaceWorld {
     /// Returns the factor on the cost of deviations of each airplane of a group, by places that all see.
     ///
-    /// It is that of its priority; and by the rules of the air it is greater for one that has right of way in some conflict,
+    /// It is that of its priority; and by a rule it is greater for one that has right of way in some conflict,
     /// and has to give way in none. Conflicts are those of present velocities within the horizon.
     pub(crate) fn deviation_weights(&self, group: &[KnownAircraft]) -> Vec<f64> {
         if !self.uses_right_of_way {
@@ -22,10 +22,10 @@ impl AirspaceWorld {
         // Only what is filed and seen, so that all compute the same.
         let filed: Vec<KnownAircraft> =
             group.iter().map(|known| KnownAircraft { next: 0, orders: 0, ..*known }).collect();
-        let traffic = TrafficView::from_group(self, &filed);
+        let traffic = TrafficView::from_filed_group(self, &filed);
         let mut has_right = vec![false; group.len()];
         let mut gives_way = vec![false; group.len()];
-        if self.right_of_way == RightOfWayRule::RulesOfTheAir {
+        if self.right_of_way != RightOfWayRule::None {
             for i in 0..group.len() {
                 for j in i + 1..group.len() {
                     match traffic.yielding_in_conflict(i, j) {

@@ -216,9 +216,13 @@ impl<'a> TrafficView<'a> {
         self.all[a].levels.overlaps(&self.all[b].levels, self.world.vertical_m)
     }
 
-    /// Returns the view of a group.
-    pub(super) fn from_group(world: &'a AirspaceWorld, group: &[KnownAircraft]) -> Self {
-        Self::new(world, group.iter().map(|known| aircraft_state(world, *known)).collect())
+    /// Returns the view of a group by those that do not know which orders the others have carried out.
+    pub(super) fn from_filed_group(world: &'a AirspaceWorld, group: &[KnownAircraft]) -> Self {
+        let filed_state = |known: &KnownAircraft| {
+            let climb_m_s = world.filed_climb_m_s(*known);
+            AircraftState { climb_m_s, ..aircraft_state(world, *known) }
+        };
+        Self::new(world, group.iter().map(filed_state).collect())
     }
 
     /// Returns which of two gives way, by their places.
@@ -249,11 +253,11 @@ impl<'a> TrafficView<'a> {
     /// of the program's own; and one that need not give way as one that does not.
     fn seen_from(&self, own: usize, other: usize) -> Option<AircraftState> {
         let seen = self.sight(own, other)?;
-        match self.yielding(own, other) {
-            Yielding::First => Some(AircraftState { yields: false, ..seen }),
-            Yielding::Second if !matches!(self.world.method, MethodKind::Own(_)) => None,
-            Yielding::Second | Yielding::Both => Some(seen),
+        let yielding = self.yielding(own, other);
+        if yielding == Yielding::Second && matches!(self.world.method, MethodKind::Own(_)) {
+            return Some(seen);
         }
+        yielding.as_minded(seen)
     }
 
     /// Returns another airplane as one sees it: in the plane of the scenario as it is, on the earth in the frame where the

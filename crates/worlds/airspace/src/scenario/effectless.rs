@@ -5,7 +5,7 @@
 use super::{AirspaceSection, CompiledAirspace, ModelSection};
 use crate::flight::{AirplaneStart, FlightTask, TurnLimit};
 use crate::method::MethodKind;
-use crate::settings::Combinations;
+use crate::settings::{Combinations, Resolution};
 use sidestep_scenario::Remark;
 
 /// Returns the remarks on a scenario, in the order of its keys.
@@ -43,6 +43,10 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
         if section.changes.is_empty() {
             note(&format!("mvp.{key}"), because);
         }
+    }
+    if has_no_vertical_resolution(compiled) {
+        let because = "right_of_way resolves conflicts in the horizontal alone";
+        note("mvp.resolution", because);
     }
     if !is_for_both && section.orca.is_given() && !uses(|method| matches!(method, MethodKind::Orca))
     {
@@ -87,6 +91,20 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     }
     remarks.extend(effectless_limits(compiled));
     remarks
+}
+
+/// Returns whether MVP is to change levels alone, under a rule by which it never does.
+fn has_no_vertical_resolution(compiled: &CompiledAirspace) -> bool {
+    let mut rules = compiled
+        .world
+        .all_rules()
+        .filter(|rules| matches!(rules.method, MethodKind::Mvp))
+        .peekable();
+    rules.peek().is_some()
+        && rules.all(|rules| {
+            let is_vertical = rules.mvp_resolution.resolution == Resolution::Vertical;
+            is_vertical && rules.right_of_way.is_horizontal()
+        })
 }
 
 /// Returns the lowest altitude in meters that an airplane has by its start and its orders.
@@ -274,6 +292,18 @@ mod tests {
         assert_eq!(remarks("bands = { look_ahead_s = 20.0 }\n"), ["airspace.bands"]);
         assert_eq!(remarks("look_every_s = 5.0\n"), ["airspace.look_every_s"]);
         assert_eq!(remarks("method = \"none\"\nlook_every_s = 5.0\n"), [""; 0]);
+    }
+
+    #[test]
+    fn resolutions_by_levels_under_a_rule_without_any_are_named() {
+        let vertical = "method = \"mvp\"\nmvp = { resolution = \"vertical\" }\n";
+        for (rule, named) in [
+            ("cruising-first", &[][..]),
+            ("cruising-first-horizontal", &["airspace.mvp.resolution"]),
+            ("climbing-first-horizontal", &["airspace.mvp.resolution"]),
+        ] {
+            assert_eq!(remarks(&format!("{vertical}right_of_way = {rule:?}\n")), named, "{rule}");
+        }
     }
 
     #[test]

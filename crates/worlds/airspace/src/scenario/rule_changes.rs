@@ -7,7 +7,7 @@ use super::compile::Compiler;
 use super::optimizer::{MvpSection, OnOffSwitch};
 use super::winds::WindLayerSection;
 use crate::flight::segments_after_orders;
-use crate::settings::{BuiltInMethod, Deployment, LevelGap, SeparationM};
+use crate::settings::{BuiltInMethod, Deployment, LevelGap, RightOfWayRule, SeparationM};
 use crate::world::AirspaceWorld;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -31,6 +31,8 @@ pub(super) struct RuleChangeSection {
     /// Only "off": the shield cannot be switched on.
     shield: Option<OnOffSwitch>,
     mvp: Option<MvpSection>,
+    /// The rule by which airplanes of one priority give way to each other.
+    right_of_way: Option<RightOfWayRule>,
     /// Distance that the airplanes keep; without airplanes, those that have none of their own.
     separation_m: Option<SeparationM>,
     vertical_m: Option<Number<LevelGap>>,
@@ -55,6 +57,7 @@ impl RuleChangeSection {
         self.method.is_some()
             || self.shield.is_some()
             || self.mvp.is_some()
+            || self.right_of_way.is_some()
             || self.vertical_m.is_some()
             || self.wind_m_s.is_some()
             || !self.winds.is_empty()
@@ -130,7 +133,7 @@ impl Compiler<'_> {
         let error =
             |cause: &str, remedy: &str| Err(self.source.error(Some(change.span()), cause, remedy));
         if !section.is_for_all() && !section.is_for_airplanes() {
-            let remedy = "give method, shield, mvp, separation_m, vertical_m, wind_m_s, winds or non_cooperative";
+            let remedy = "give method, shield, mvp, right_of_way, separation_m, vertical_m, wind_m_s, winds or non_cooperative";
             return error("a change of nothing", remedy);
         }
         if section.airplanes.is_some() && (section.is_for_all() || !section.is_for_airplanes()) {
@@ -152,6 +155,10 @@ impl Compiler<'_> {
         if let Some(mvp) = &section.mvp {
             world.mvp = mvp.or_default(world.mvp);
             world.mvp_resolution = mvp.resolution_or_default(world.mvp_resolution);
+        }
+        if let Some(right_of_way) = section.right_of_way {
+            world.right_of_way = right_of_way;
+            world.uses_right_of_way = world.may_have_right_of_way();
         }
         if let Some(vertical_m) = section.vertical_m {
             self.set_vertical_m(world, vertical_m.get());

@@ -19,6 +19,7 @@ use super::{
     banked_turn_deg_s, callsign, header_text,
 };
 use crate::flight::SeparationMinima;
+use crate::settings::RightOfWayRule;
 use sidestep_import::bluesky::{AircraftCommand, AircraftSetting, ScnAircraft, ScnFile};
 use sidestep_import::local_plane::{LatLon, LocalPlane};
 use sidestep_kernel::{InputError, math};
@@ -90,6 +91,10 @@ fn settings_text(settings: &ImportedScenarioSettings) -> String {
     let _ = writeln!(text, "mvp = {{ {mvp} }}");
     if start.is_bare {
         text.push_str("shield = \"off\"\n");
+    }
+    let right_of_way = start.right_of_way.unwrap_or_default();
+    if right_of_way != RightOfWayRule::None {
+        let _ = writeln!(text, "right_of_way = {:?}", right_of_way.name());
     }
     if let Some(wind) = &start.wind {
         let _ = writeln!(text, "{}", wind.key_text());

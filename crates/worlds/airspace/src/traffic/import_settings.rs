@@ -2,10 +2,10 @@
 
 use super::flyable_aircraft::aircraft_at_flying_speed;
 use super::{FOOT_M, KNOT_M_S, MVP_LOOK_AHEAD_S, NAUTICAL_MILE_M};
-use crate::settings::Resolution;
+use crate::settings::{Resolution, RightOfWayRule};
 use sidestep_import::bluesky::{
-    AircraftSetting, HorizontalResolution, ResolutionMethod, ScnAircraft, ScnFile, Setting,
-    TimedSetting, Wind,
+    AircraftSetting, HorizontalResolution, PriorityRule, ResolutionMethod, ScnAircraft, ScnFile,
+    Setting, TimedSetting, Wind,
 };
 use sidestep_kernel::geometry::{lerp, norm};
 use sidestep_kernel::{InputError, math};
@@ -24,6 +24,8 @@ pub(crate) struct ImportedRules {
     /// What MVP changes; `None` where the file says nothing about that.
     pub(super) resolution: Option<Resolution>,
     pub(super) vertical_factor: Option<f64>,
+    /// Who gives way; `None` where the file says nothing about that.
+    pub(super) right_of_way: Option<RightOfWayRule>,
     pub(super) wind: Option<ImportedWind>,
     pub(super) separation_m: f64,
     pub(super) vertical_m: f64,
@@ -81,6 +83,7 @@ struct SettingsInForce {
     resolution_factor: Option<f64>,
     limits: Option<ResolutionLimits>,
     vertical_factor: Option<f64>,
+    priority_rule: Option<PriorityRule>,
     radius_nm: f64,
     half_height_ft: f64,
     winds: Vec<Wind>,
@@ -95,6 +98,7 @@ impl Default for SettingsInForce {
             resolution_factor: None,
             limits: None,
             vertical_factor: None,
+            priority_rule: None,
             radius_nm: 5.0,
             half_height_ft: 1000.0,
             winds: Vec::new(),
@@ -266,6 +270,10 @@ fn change_text(before: &ImportedRules, after: &ImportedRules) -> String {
     if new_mvp != old_mvp && !new_mvp.is_empty() {
         let _ = write!(text, ", mvp = {{ {new_mvp} }}");
     }
+    if after.right_of_way != before.right_of_way {
+        let rule = after.right_of_way.unwrap_or_default();
+        let _ = write!(text, ", right_of_way = {:?}", rule.name());
+    }
     if after.separation_m != before.separation_m {
         let _ = write!(text, ", separation_m = {:?}", after.separation_m);
     }
@@ -392,6 +400,7 @@ impl SettingsReader<'_> {
             Setting::VerticalResolutionFactor(factor) => {
                 self.refuse(timed, format!("a factor of {factor}"), "give 0.5 to 10");
             }
+            Setting::PriorityRule(rule) => self.now.priority_rule = Some(rule),
             Setting::LookAheadS(s) if (MIN_LOOK_AHEAD_S..=MAX_LOOK_AHEAD_S).contains(&s) => {
                 self.now.look_ahead_s = Some(s);
             }
@@ -437,10 +446,22 @@ impl SettingsReader<'_> {
             resolution_factor: self.now.resolution_factor,
             resolution: self.now.limits.map(ResolutionLimits::resolution),
             vertical_factor: self.now.vertical_factor,
+            right_of_way: self.now.priority_rule.map(right_of_way),
             wind,
             separation_m: self.now.radius_nm * NAUTICAL_MILE_M,
             vertical_m: self.now.half_height_ft * FOOT_M,
         }
+    }
+}
+
+/// Returns the rule of a scenario that says the same as one of BlueSky.
+fn right_of_way(rule: PriorityRule) -> RightOfWayRule {
+    match rule {
+        PriorityRule::Both => RightOfWayRule::None,
+        PriorityRule::CruisingFirst => RightOfWayRule::CruisingFirst,
+        PriorityRule::ClimbingFirst => RightOfWayRule::ClimbingFirst,
+        PriorityRule::CruisingFirstHorizontal => RightOfWayRule::CruisingFirstHorizontal,
+        PriorityRule::ClimbingFirstHorizontal => RightOfWayRule::ClimbingFirstHorizontal,
     }
 }
 
@@ -567,6 +588,21 @@ mod tests {
         assert_eq!(settings.start.mvp_text(), keys);
         let (settings, _) = found("RMETHV V/S");
         assert_eq!(settings.start.mvp_text(), "", "as long as nothing is resolved");
+    }
+
+    #[test]
+    fn rules_of_priority_are_rights_of_way() {
+        let (settings, _) = found("RESO MVP\nPRIORULES ON FF2");
+        assert_eq!(settings.start.right_of_way, Some(RightOfWayRule::CruisingFirst));
+        let (settings, _) = found_at(
+            "00:00:00>RESO MVP\n00:01:00>PRIORULES ON LAY2\n00:02:00>RFACH 1.2\n00:03:00>PRIORULES ON FF1\n",
+        );
+        assert_eq!(settings.start.right_of_way, None);
+        let changes: Vec<&str> = settings.changes.iter().map(|one| one.text.as_str()).collect();
+        let rules = ["climbing-first-horizontal", "none"];
+        let [on, off] = rules.map(|rule| format!(", right_of_way = {rule:?}"));
+        assert_eq!([changes[0], changes[2]], [on, off]);
+        assert_eq!(changes.len(), 3);
     }
 
     #[test]
