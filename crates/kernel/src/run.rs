@@ -477,6 +477,10 @@ where
             .try_for_each(|(block, table)| recorder.append(table, &block))
     }
 
+    fn record_open(&mut self, recorder: &mut dyn Recorder) -> Result<bool, RecordError> {
+        self.world.record_open(&mut self.state, &mut self.collector, self.cycle, recorder)
+    }
+
     fn scenery(&self) -> Scenery {
         self.world.scenery(&self.config.name)
     }

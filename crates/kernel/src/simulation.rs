@@ -79,6 +79,13 @@ pub trait Simulation: Any + Send {
     /// When the recorder cannot store it, or [`Simulation::start_recording`] was never called.
     fn record(&mut self, recorder: &mut dyn Recorder) -> Result<(), RecordError>;
 
+    /// Records what still lasts at the end of a recording, after all other rows; returns whether there are such rows. They
+    /// are of the present cycle: a run that continues from here drops them first.
+    ///
+    /// # Errors
+    /// When the recorder cannot store it.
+    fn record_open(&mut self, recorder: &mut dyn Recorder) -> Result<bool, RecordError>;
+
     /// The scenery: everything that stays the same during the run.
     fn scenery(&self) -> Scenery;
 

@@ -209,6 +209,21 @@ pub trait RecordableWorld: World {
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError>;
 
+    /// Records what lasts at `now`, of which else a row is recorded when it ends; returns whether there are such rows. They
+    /// are of cycle `now`, so that a run that continues from there drops them, and records what has become of them.
+    ///
+    /// # Errors
+    /// When the recorder cannot store them.
+    fn record_open(
+        &self,
+        _: &mut Self::State,
+        _: &mut Self::Collector,
+        _now: Cycle,
+        _: &mut dyn Recorder,
+    ) -> Result<bool, RecordError> {
+        Ok(false)
+    }
+
     /// Returns the recorded tables and columns that hold the positions of bodies.
     fn position_columns(&self, _: &Self::Collector) -> Vec<PositionTableColumns> {
         Vec::new()

@@ -306,13 +306,19 @@ impl ManagedRun {
         self.rows.is_some()
     }
 
-    /// Takes the rows that were kept in memory so far, by table; none if rows are not kept.
+    /// Takes the rows that were kept in memory so far, by table; none if rows are not kept. At the planned end of the run
+    /// there are also those of what lasts beyond it.
     ///
     /// # Errors
     /// When the last ones cannot be handed over.
     pub fn take_rows(&mut self) -> Result<Vec<(TableSchema, Vec<ColumnValues>)>, RecordError> {
         let Some(rows) = &mut self.rows else { return Ok(Vec::new()) };
         self.run.record(rows)?;
+        let is_complete = self.run.cycle() >= self.run.config().cycles || self.run.is_over();
+        // Once, however often rows are taken there.
+        if is_complete && rows.first_cycle() < self.run.cycle() {
+            self.run.record_open(rows)?;
+        }
         let frames = self.frames.as_mut().map(FrameRows::take);
         Ok(rows.take(self.run.cycle()).into_iter().chain(frames).collect())
     }

@@ -147,15 +147,19 @@ impl RunRecorder {
         }
     }
 
-    /// Declares the tables complete; reports and pictures may follow.
+    /// Declares the tables of a run at its end complete; reports and pictures may follow.
     ///
     /// # Errors
     /// An I/O error.
-    pub(crate) fn finish_tables(&mut self, run: &dyn Simulation) -> Result<(), RecordError> {
+    pub(crate) fn finish_tables(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         match &mut self.rows {
-            RowWriter::Simulation(recorder) => recorder.finish(),
+            RowWriter::Simulation(recorder) => {
+                run.record_open(recorder)?;
+                recorder.finish()
+            }
             RowWriter::Flight(recorder) => {
                 recorder.make_durable(run.cycle())?;
+                run.record_open(recorder)?;
                 recorder.finish()
             }
         }
@@ -167,13 +171,28 @@ impl RunRecorder {
     /// An I/O error.
     pub(crate) fn save_unfinished(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
         match &mut self.rows {
-            RowWriter::Simulation(recorder) => run.record(recorder)?,
+            RowWriter::Simulation(recorder) => {
+                run.record(recorder)?;
+                self.save_checkpoint(run)?;
+                self.save_open_rows(run)
+            }
             RowWriter::Flight(recorder) => {
                 run.record(recorder)?;
-                return self.finish_tables(run);
+                recorder.make_durable(run.cycle())?;
+                // Without what lasts: parts of a flight that are simulated on from here are not divided again.
+                recorder.finish()
             }
         }
-        self.save_checkpoint(run)
+    }
+
+    /// Saves what lasts, in parts of the cycle of the checkpoint, which a resumed run deletes.
+    fn save_open_rows(&mut self, run: &mut dyn Simulation) -> Result<(), RecordError> {
+        if let RowWriter::Simulation(recorder) = &mut self.rows
+            && run.record_open(recorder)?
+        {
+            recorder.make_durable(run.cycle() + 1)?;
+        }
+        Ok(())
     }
 
     /// Returns whether it records a flight in real time.

@@ -173,6 +173,10 @@ impl Simulation for RecordedPlayback {
         Ok(())
     }
 
+    fn record_open(&mut self, _: &mut dyn Recorder) -> Result<bool, RecordError> {
+        Ok(false)
+    }
+
     fn scenery(&self) -> Scenery {
         self.start.scenery()
     }

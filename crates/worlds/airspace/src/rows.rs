@@ -1,7 +1,7 @@
 //! The tables that a run records, and their rows until they are recorded.
 
 use super::decide::OptimizationRecord;
-use super::encounters::EndedEncounter;
+use super::encounters::EncounterRecord;
 use super::events::{Event, EventKind, EventQuantity};
 use super::flown_leg::FlownLeg;
 use super::settings::RecordSection;
@@ -124,20 +124,26 @@ fn optimizations_table() -> Table<OptimizationRecord> {
         .u64("bytes", "their bytes", |o| o.traffic.bytes)
 }
 
-fn pairs_table(world: &AirspaceWorld) -> Table<EndedEncounter> {
+fn pairs_table(world: &AirspaceWorld) -> Table<EncounterRecord> {
     let [callsigns, other_callsigns] = [callsigns(world), callsigns(world)];
     let table = Table::new("pairs")
-        .u64("cycle", "cycle of dt in which the encounter ended", |e: &EndedEncounter| e.cycle)
+        .u64(
+            "cycle",
+            "cycle of dt in which the encounter ended; of one that is open, the first that was not flown",
+            |e: &EncounterRecord| e.cycle,
+        )
         .u32("airplane", "entity id", |e| e.airplanes[0])
-        .text("callsign", "its call sign", move |e: &EndedEncounter| {
+        .text("callsign", "its call sign", move |e: &EncounterRecord| {
             callsigns.get(e.airplanes[0] as usize).cloned().flatten()
         })
         .u32("other", "the other airplane", |e| e.airplanes[1])
-        .text("other_callsign", "its call sign", move |e: &EndedEncounter| {
+        .text("other_callsign", "its call sign", move |e: &EncounterRecord| {
             other_callsigns.get(e.airplanes[1] as usize).cloned().flatten()
         })
         .f64("from_s", "start of the encounter, after the start of the run", |e| e.encounter.from_s)
-        .f64("until_s", "its end", |e| e.encounter.until_s)
+        .f64("until_s", "its end; of one that is open, the end of the recording", |e| {
+            e.encounter.until_s
+        })
         .f64("nearest_m", "closest horizontal approach in it", |e| e.encounter.nearest_m)
         .f64("vertical_m", "difference of altitude at that time", |e| e.encounter.vertical_m)
         .u64("conflicts", "conflicts in it", |e| e.encounter.counts.conflicts)
@@ -153,17 +159,20 @@ fn pairs_table(world: &AirspaceWorld) -> Table<EndedEncounter> {
         .u64("nmacs", "near mid-air collisions", |e| e.encounter.counts.nmacs)
         .label("reported", "whether the shield had reported the pair", ["no", "yes"], |e| {
             u32::from(e.is_reported)
+        })
+        .label("open", "whether it lasted at the end of the recording", ["no", "yes"], |e| {
+            u32::from(e.is_open)
         });
     with_encounter_time(table, world)
 }
 
 /// Adds the time of day at which an encounter began, where the scenario has one.
 fn with_encounter_time(
-    table: Table<EndedEncounter>,
+    table: Table<EncounterRecord>,
     world: &AirspaceWorld,
-) -> Table<EndedEncounter> {
+) -> Table<EncounterRecord> {
     let Some(start_utc_s) = world.start_utc_s else { return table };
-    let utc_s = move |e: &EndedEncounter| start_utc_s + e.encounter.from_s;
+    let utc_s = move |e: &EncounterRecord| start_utc_s + e.encounter.from_s;
     table.f64("utc_s", "start of the encounter, seconds since 1970, UTC", utc_s)
 }
 
@@ -178,7 +187,7 @@ pub(super) struct RecordBuffers {
     flown: TableRowsBuffer<FlownLeg>,
     events: TableRowsBuffer<Event>,
     optimizations: TableRowsBuffer<OptimizationRecord>,
-    pairs: TableRowsBuffer<EndedEncounter>,
+    pairs: TableRowsBuffer<EncounterRecord>,
 }
 
 impl RecordBuffers {
@@ -190,6 +199,11 @@ impl RecordBuffers {
     /// Returns whether controls from outside of the run are to be kept.
     pub(super) fn is_recording_controls(&self) -> bool {
         self.record.controls
+    }
+
+    /// Returns whether rows of encounters are kept.
+    pub(super) fn is_recording_pairs(&self) -> bool {
+        self.pairs.is_enabled()
     }
 
     /// Starts to keep rows of the tables that the scenario asks for; before this call none are kept.
@@ -210,7 +224,7 @@ impl RecordBuffers {
         self.events.push(event);
     }
 
-    pub(super) fn push_encounter(&mut self, encounter: EndedEncounter) {
+    pub(super) fn push_encounter(&mut self, encounter: EncounterRecord) {
         self.pairs.push(encounter);
     }
 

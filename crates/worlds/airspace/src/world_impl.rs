@@ -1,7 +1,7 @@
 //! The hooks by which a run asks the world for more than its phases.
 
 use super::decide::OptimizationRecord;
-use super::encounters::{EndedEncounter, SweepBuffers};
+use super::encounters::{EncounterRecord, SweepBuffers};
 use super::events::Event;
 use super::flown_leg::FlownLeg;
 use super::metric_info::METRIC_INFO;
@@ -153,7 +153,7 @@ impl World for AirspaceWorld {
             collector.rows.push_event(event);
         }
         // After the events, which report airplanes beyond the bounds.
-        encounters.sort_unstable_by_key(EndedEncounter::sort_key);
+        encounters.sort_unstable_by_key(EncounterRecord::sort_key);
         for mut encounter in encounters {
             encounter.is_reported = collector.counters.is_reported(encounter.airplanes);
             collector.rows.push_encounter(encounter);
@@ -186,6 +186,27 @@ impl RecordableWorld for AirspaceWorld {
         recorder: &mut dyn Recorder,
     ) -> Result<(), RecordError> {
         collector.rows.record(recorder)
+    }
+
+    fn record_open(
+        &self,
+        _: &mut AirspaceState,
+        collector: &mut Collector,
+        now: Cycle,
+        recorder: &mut dyn Recorder,
+    ) -> Result<bool, RecordError> {
+        let Collector { counters, rows, .. } = collector;
+        if !rows.is_recording_pairs() {
+            return Ok(false);
+        }
+        let mut has_any = false;
+        for mut encounter in counters.encounters.open_records(now) {
+            encounter.is_reported = counters.is_reported(encounter.airplanes);
+            rows.push_encounter(encounter);
+            has_any = true;
+        }
+        rows.record(recorder)?;
+        Ok(has_any)
     }
 
     fn position_columns(&self, _: &Collector) -> Vec<PositionTableColumns> {

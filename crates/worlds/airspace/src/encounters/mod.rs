@@ -154,19 +154,21 @@ impl Encounter {
     }
 }
 
-/// An encounter that has ended, for the table `pairs`.
+/// An encounter that has ended, or lasts at the end of a recording, for the table `pairs`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct EndedEncounter {
-    /// Cycle in which that was found.
+pub(crate) struct EncounterRecord {
+    /// Cycle in which its end was found, or the one that comes next.
     pub(crate) cycle: Cycle,
     /// Ids of the two, the smaller one first.
     pub(crate) airplanes: [EntityId; 2],
     pub(crate) encounter: Encounter,
     /// Whether the shield had reported the pair by then.
     pub(crate) is_reported: bool,
+    /// Whether it lasts.
+    pub(crate) is_open: bool,
 }
 
-impl EndedEncounter {
+impl EncounterRecord {
     /// Returns the sort key of the table's rows. Two encounters of a pair in one cycle have different starts.
     pub(crate) fn sort_key(&self) -> (Cycle, [EntityId; 2], u64) {
         // Times are not negative, so that their bits are in their order.
@@ -193,8 +195,19 @@ impl Encounters {
         counts
     }
 
+    /// Returns those that last after `now` cycles, as they are, by ids.
+    pub(crate) fn open_records(&self, now: Cycle) -> impl Iterator<Item = EncounterRecord> {
+        self.open.iter().map(move |(&(a, b), encounter)| EncounterRecord {
+            cycle: now,
+            airplanes: [a, b],
+            encounter: encounter.ended(),
+            is_reported: false,
+            is_open: true,
+        })
+    }
+
     /// Ends those that have not been looked at in a cycle: the two are far apart, or one is gone.
-    fn end_unseen(&mut self, cycle: Cycle, ended: &mut Vec<EndedEncounter>) {
+    fn end_unseen(&mut self, cycle: Cycle, ended: &mut Vec<EncounterRecord>) {
         let unseen: Vec<_> = self
             .open
             .iter()
@@ -213,11 +226,17 @@ impl Encounters {
         cycle: Cycle,
         (a, b): (EntityId, EntityId),
         encounter: Encounter,
-        ended: &mut Vec<EndedEncounter>,
+        ended: &mut Vec<EncounterRecord>,
     ) {
         let encounter = encounter.ended();
         self.ended.add(&encounter.counts);
-        ended.push(EndedEncounter { cycle, airplanes: [a, b], encounter, is_reported: false });
+        ended.push(EncounterRecord {
+            cycle,
+            airplanes: [a, b],
+            encounter,
+            is_reported: false,
+            is_open: false,
+        });
     }
 }
 

@@ -1,6 +1,6 @@
 //! The encounters in the legs of one cycle.
 
-use super::{Encounter, EncounterStep, Encounters, EndedEncounter};
+use super::{Encounter, EncounterRecord, EncounterStep, Encounters};
 use crate::flight::{
     ConstantRateLeg, Frame, KinematicState, PairPlane, PairZones, Point, Proximity, RigidMotion,
     SeparationMinima, Surface,
@@ -106,7 +106,7 @@ impl Encounters {
         world: &AirspaceWorld,
         flown: &[FlownLeg],
         buffers: &mut SweepBuffers,
-        ended: &mut Vec<EndedEncounter>,
+        ended: &mut Vec<EncounterRecord>,
     ) {
         let (Some(measures), Some(first)) = (world.measures.pairs, flown.first()) else { return };
         let swept = SweptCycle { world, measures, cycle: first.cycle, flown };
@@ -120,7 +120,7 @@ impl Encounters {
         &mut self,
         swept: &SweptCycle<'_>,
         pair: &FlownPair<'_>,
-        ended: &mut Vec<EndedEncounter>,
+        ended: &mut Vec<EncounterRecord>,
     ) {
         let ids = (pair.ids[0], pair.ids[1]);
         let mut open = if self.open.is_empty() { None } else { self.open.remove(&ids) };

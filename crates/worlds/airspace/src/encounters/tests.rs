@@ -360,9 +360,15 @@ type Row = std::collections::BTreeMap<String, f64>;
 fn run_recorded(airspace: &str, airplanes: &str) -> MemoryRecorder {
     let mut run = run(airspace, airplanes, 1);
     run.start_recording();
-    let mut recorder = MemoryRecorder::new(&Simulation::schemas(&run));
-    run.advance(400);
+    record_until(&mut run, 400)
+}
+
+/// Returns the rows of a run until a cycle, which ends the recording.
+fn record_until(run: &mut AirspaceRun, cycle: u64) -> MemoryRecorder {
+    let mut recorder = MemoryRecorder::new(&Simulation::schemas(run));
+    run.advance(cycle - run.cycle());
     run.record(&mut recorder).expect("a recorder in memory");
+    run.record_open(&mut recorder).expect("a recorder in memory");
     recorder
 }
 
@@ -390,4 +396,32 @@ fn each_encounter_is_a_row_and_the_rows_add_up_to_the_metrics() {
     assert_eq!(Some(sum("well_clear_violations")), metrics.well_clear_violations);
     assert!(rows.iter().all(|row| row["from_s"] < row["until_s"]));
     assert!(rows.iter().all(|row| (row["severity"] > 0.0) == (row["intrusions"] > 0.0)));
+}
+
+#[test]
+fn an_encounter_that_lasts_has_a_row_that_says_so_and_later_one_of_its_end() {
+    let mut lasting = run(STRAIGHT, &head_on(200.0, ""), 1);
+    lasting.start_recording();
+    let open = rows(&record_until(&mut lasting, 97));
+    assert_eq!(open.len(), 1);
+    assert_eq!((open[0]["open"], open[0]["cycle"], open[0]["until_s"]), (1.0, 97.0, 97.0));
+    assert_eq!((open[0]["conflicts"], open[0]["intrusions"]), (1.0, 1.0));
+    assert!(open[0]["nearest_m"] > 200.0 && open[0]["severity"] > 0.0);
+    // What comes of it is as if nobody had asked before.
+    let ended = rows(&record_until(&mut lasting, 400));
+    assert_eq!(ended, rows(&run_recorded(STRAIGHT, &head_on(200.0, ""))));
+    assert_eq!((ended.len(), ended[0]["open"], ended[0]["from_s"]), (1, 0.0, open[0]["from_s"]));
+}
+
+#[test]
+fn rows_of_what_lasts_add_up_to_the_metrics_too() {
+    let airspace = STRAIGHT.replace("none", "mvp");
+    let mut crowded = run(&airspace, &crowd(), 1);
+    crowded.start_recording();
+    let rows = rows(&record_until(&mut crowded, 30));
+    let metrics = crowded.metrics();
+    let sum = |column: &str| rows.iter().map(|row| row[column]).sum::<f64>() as u64;
+    assert!(rows.iter().any(|row| row["open"] > 0.0));
+    assert_eq!(Some(sum("conflicts")), metrics.conflicts);
+    assert_eq!(Some(sum("intrusions")), metrics.intrusions);
 }
