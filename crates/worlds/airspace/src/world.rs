@@ -1,5 +1,6 @@
 //! A compiled airspace: everything that stays fixed during a run.
 
+mod later_areas;
 mod solo_flight;
 #[cfg(test)]
 mod tests;
@@ -261,7 +262,8 @@ impl AirspaceWorld {
         let look_ahead_s = self.reactive_settings().look_ahead_s;
         let max_lead_s = (look_ahead_s - self.timing.dt_s - 2.0 * radius_s).max(radius_s);
         let model = &self.airplanes[i].model;
-        Fallback::choices(model, self.orbit_rad_s[i], self.timing.dt_s, max_lead_s)
+        let choices = Fallback::choices(model, self.orbit_rad_s[i], self.timing.dt_s, max_lead_s);
+        self.with_ways_out(i, choices)
     }
 
     /// Returns whether airplanes compute plans for each other from what all see: where messages get lost, all see the same,

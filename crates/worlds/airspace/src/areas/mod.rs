@@ -25,7 +25,7 @@ pub(crate) use path::{PathPiece, TOLERANCE_M as AREA_TOLERANCE_M, profile_pieces
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 pub use shape::AreaShape;
-pub(crate) use shape::find_crossing;
+pub(crate) use shape::{find_crossing, square_to_edge_m2};
 use sidestep_kernel::geometry::{add_scaled, sub};
 use sidestep_kernel::math;
 use std::sync::Arc;

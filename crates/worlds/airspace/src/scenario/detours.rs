@@ -1,7 +1,7 @@
 //! Flight plans around areas.
 //!
 //! Where the straight way from one way-point to the next leads through an area that does not move, further way-points lead
-//! around it, as a flight planner would file them. Methods only have to return to the route then, also from concave
+//! around it, as a flight planner would file them; not around one that begins long after an airplane has passed. Methods only have to return to the route then, also from concave
 //! areas. An airplane that others have pushed past such a way-point is done with it (`act/areas.rs`). Areas that move, and those that are over before an airplane could come to them, are left to the method.
 
 use crate::areas::{Area, Areas, DetourPlanner};
@@ -13,6 +13,11 @@ use std::mem;
 const GAP_TOLERANCES: f64 = 1.5;
 /// Meters beside that, more than all margins of plans.
 const MORE_GAP_M: f64 = 10.0;
+
+/// Delays with which airplanes are reckoned to be through an area before it begins: a part of the time since the start of the
+/// run, and seconds beside it.
+const MAX_LATE_FRACTION: f64 = 0.2;
+const MAX_LATE_S: f64 = 60.0;
 
 /// What the flight plans of a scenario have to lead around, and how.
 pub(super) struct DetourRules<'a> {
@@ -67,7 +72,9 @@ impl DetourRules<'_> {
     ) -> Vec<Point> {
         let mut route = Vec::with_capacity(way_points.len());
         for way_point in way_points {
-            let areas = self.areas.iter().map(|area| &**area).filter(|area| leg.may_meet(area));
+            let leg_s = self.surface.distance_m(leg.from, way_point) / leg.v_m_s;
+            let all = self.areas.iter().map(|area| &**area);
+            let areas = all.filter(|area| leg.may_meet(area, leg_s));
             let planner = DetourPlanner {
                 surface: self.surface,
                 areas: areas.collect(),
@@ -95,10 +102,12 @@ struct Leg {
 }
 
 impl Leg {
-    /// Returns whether it has to lead around an area. One that begins later counts, too, because stored fallbacks have to
-    /// keep clear of it.
-    fn may_meet(&self, area: &Area) -> bool {
-        !area.is_moving() && area.until_s > self.at_s && area.is_on_levels(&self.levels)
+    /// Returns whether it has to lead around an area, if it takes some seconds straight on: unless the area is over before,
+    /// or begins long after.
+    fn may_meet(&self, area: &Area, leg_s: f64) -> bool {
+        let past_s = self.at_s + leg_s;
+        let is_past = past_s + MAX_LATE_FRACTION * past_s + MAX_LATE_S < area.from_s;
+        !area.is_moving() && area.until_s > self.at_s && !is_past && area.is_on_levels(&self.levels)
     }
 }
 

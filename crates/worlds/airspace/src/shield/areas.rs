@@ -5,7 +5,8 @@
 //!
 //! **Areas that do not move relative to the air.** A plan is *clear* of one if it keeps out of it (or inside of one of kind
 //! `in`) during `dt`, and on the fallback forever after that, as long as the area lasts. Of one that begins later the
-//! fallback has to keep clear from then on. *Invariant:* the stored fallback of an airplane is clear of each such area,
+//! fallback has to keep clear from then on, so that an airplane may be in it before as long as some fallback leads out in time
+//! (`world/later_areas.rs`). *Invariant:* the stored fallback of an airplane is clear of each such area,
 //! unless it is exempt from it. It is kept as the one about pairs: all plans are clear, and the fallback is itself one. So
 //! an airplane that is not exempt never enters an area. It is exempt from an area as long as its stored fallback is not
 //! clear of it, and so it can become exempt only where it enters, or other rules begin; from then on its plans may come to

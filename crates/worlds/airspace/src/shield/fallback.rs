@@ -128,6 +128,23 @@ impl Fallback {
     }
 }
 
+impl Fallback {
+    /// Returns fallbacks with others beside them that fly straight on, each twice as far as the one before, until they fly as
+    /// many `dt`, or as many as they may.
+    pub(crate) fn with_longer_straights(choices: &[Self], straight_cycles: f64) -> Arc<[Self]> {
+        let longest = choices.iter().map(|choice| choice.straight_cycles).max().unwrap_or(0);
+        // The conversion saturates.
+        let enough = (straight_cycles.ceil() as u8).min(Self::MAX_CYCLES);
+        let mut all = choices.to_vec();
+        let mut straight_cycles = longest.max(1);
+        while straight_cycles < enough {
+            straight_cycles = straight_cycles.saturating_mul(2).min(enough);
+            all.extend(OrbitSide::BOTH.map(|side| Self::after_straight(straight_cycles, side)));
+        }
+        all.into()
+    }
+}
+
 impl From<u16> for Fallback {
     fn from(code: u16) -> Self {
         let [low, high] = code.to_le_bytes();
