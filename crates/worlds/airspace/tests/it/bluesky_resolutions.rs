@@ -2,7 +2,7 @@
 //! the largest changes of speed and level agree.
 //!
 //! `fixtures/bluesky_resolutions.json` are our own measurements, made with `python/fly_bluesky_resolutions.py`, BlueSky
-//! 1.1.1 and Python 3.11: of pairs 0 to 29 of [`pair`] for each resolution.
+//! 1.1.1 and Python 3.11: of pairs 0 to 29 of [`pair`] for each resolution, and of pairs 0 to 9 for each code of `PRIORULES`.
 
 use serde::Deserialize;
 use sidestep_airspace::airspace_run;
@@ -24,6 +24,9 @@ struct PairResult {
     off_level_m: f64,
     /// Largest difference of the speed of one of them from that at the start, in meters per second.
     off_speed_m_s: f64,
+    /// The same of each; of rules of priority alone.
+    #[serde(default)]
+    off_speeds_m_s: [f64; 2],
     /// The same at the end.
     back_m: f64,
     back_m_s: f64,
@@ -46,9 +49,9 @@ fn pair(run: usize, climbs: bool) -> [Airplane; 2] {
     [[-5250.0, 0.0, 0.0, LEVEL_M, 0.0], [x, y, angle.to_degrees(), LEVEL_M - below_m, climb_m_s]]
 }
 
-fn scenario(resolution: &str, pair: &[Airplane]) -> Source {
+fn scenario(keys: &str, resolution: &str, pair: &[Airplane]) -> Source {
     let mut text = format!(
-        "format = 1\nworld = \"airspace\"\n[airspace]\nmethod = \"mvp\"\nshield = \"off\"\nlook_every_s = 1.0\n\
+        "format = 1\nworld = \"airspace\"\n[airspace]\n{keys}\nmethod = \"mvp\"\nshield = \"off\"\nlook_every_s = 1.0\n\
          mvp = {{ look_ahead_s = 90.0, margin = 1.05, resolution = \"{resolution}\", speed_factors = [0.1, 10.0] }}\n\
          [airplane]\nv_min_m_s = 25.0\nv_max_m_s = 45.0\nacceleration_m_s2 = 0.5\nclimb_max_m_s = 12.0\n\
          descent_max_m_s = 12.0\n"
@@ -69,12 +72,14 @@ fn scenario(resolution: &str, pair: &[Airplane]) -> Source {
     Source::new("pair", text, "")
 }
 
-fn ours(resolution: &str, pair: &[Airplane]) -> PairResult {
-    let mut run = airspace_run(&scenario(resolution, pair), 1).unwrap_or_else(|e| panic!("{e}"));
+fn ours(keys: &str, resolution: &str, pair: &[Airplane]) -> PairResult {
+    let source = scenario(keys, resolution, pair);
+    let mut run = airspace_run(&source, 1).unwrap_or_else(|e| panic!("{e}"));
     let mut result = PairResult {
         is_lost: false,
         off_level_m: 0.0,
         off_speed_m_s: 0.0,
+        off_speeds_m_s: [0.0; 2],
         back_m: 0.0,
         back_m_s: 0.0,
     };
@@ -87,7 +92,11 @@ fn ours(resolution: &str, pair: &[Airplane]) -> PairResult {
             .zip(&now)
             .map(|(from, to)| sidestep_kernel::math::hypot(to[0] - from[0], to[1] - from[1]));
         // As long as it turns the chord is a little shorter than the way.
-        result.back_m_s = speeds.map(|v_m_s| (v_m_s - V_M_S).abs()).fold(0.0, f64::max);
+        let off_m_s: Vec<f64> = speeds.map(|v_m_s| (v_m_s - V_M_S).abs()).collect();
+        result.back_m_s = off_m_s.iter().copied().fold(0.0, f64::max);
+        for (largest, off_m_s) in result.off_speeds_m_s.iter_mut().zip(off_m_s) {
+            *largest = largest.max(off_m_s);
+        }
         result.back_m = (run.state().airplanes[0].altitude_m.get() - LEVEL_M).abs();
         result.off_speed_m_s = result.off_speed_m_s.max(result.back_m_s);
         result.off_level_m = result.off_level_m.max(result.back_m);
@@ -118,7 +127,7 @@ fn pairs_are_flown_as_in_bluesky() {
         let mut losses = [0, 0];
         let mut agree = 0;
         for (run, theirs) in flown[commands].iter().enumerate() {
-            let ours = ours(resolution, &pair(run, resolution == "vertical"));
+            let ours = ours("", resolution, &pair(run, resolution == "vertical"));
             println!("{resolution} {run}: {ours:?} {theirs:?}");
             losses[0] += usize::from(ours.is_lost);
             losses[1] += usize::from(theirs.is_lost);
@@ -133,5 +142,33 @@ fn pairs_are_flown_as_in_bluesky() {
         assert!(differences[1] < 0.3, "{resolution}: {differences:?} m/s");
         // Where a pair is in conflict again while it climbs, it is so at other times: BlueSky accelerates in the vertical.
         assert!(agree >= 18 && differences[0] < 200.0, "{resolution}: {agree}, {differences:?} m");
+    }
+}
+
+/// One that cruises, and one that climbs through its level: by heading and speed, the one that has right of way keeps its
+/// speed, and the other one changes it as in BlueSky.
+#[test]
+fn pairs_give_way_by_phases_as_in_bluesky() {
+    let flown = fixture();
+    for (code, rule) in [
+        ("FF1", "none"),
+        ("FF2", "cruising-first"),
+        ("FF3", "climbing-first"),
+        ("LAY1", "cruising-first-horizontal"),
+        ("LAY2", "climbing-first-horizontal"),
+    ] {
+        let mut difference_m_s: f64 = 0.0;
+        for (run, theirs) in flown[&format!("RMETHH BOTH;PRIORULES ON {code}")].iter().enumerate() {
+            let keys = format!("right_of_way = {rule:?}");
+            let ours = ours(&keys, "heading-speed", &pair(run, true));
+            println!("{rule} {run}: {ours:?} {theirs:?}");
+            assert_eq!((ours.is_lost, theirs.is_lost), (false, false), "{rule} {run}");
+            for (ours, theirs) in ours.off_speeds_m_s.iter().zip(theirs.off_speeds_m_s) {
+                assert_eq!(*ours < 0.01, theirs == 0.0, "{rule} {run}");
+                difference_m_s = difference_m_s.max((ours - theirs).abs());
+            }
+        }
+        println!("{rule}: {difference_m_s} m/s");
+        assert!(difference_m_s < 0.3, "{rule}: {difference_m_s} m/s");
     }
 }

@@ -3,7 +3,7 @@ JSON.
 
 usage: fly_bluesky_resolutions.py CASES
 
-CASES is a JSON file: the limits, and by commands of RMETHH or RMETHV a list of cases, each two airplanes
+CASES is a JSON file: the limits, and by commands of RMETHH, RMETHV or PRIORULES, with `;` between several, a list of cases, each two airplanes
 [x, y, heading, altitude, rate of climb] in meters, degrees and m/s. One with a rate climbs from the start to `top_m`.
 """
 
@@ -54,7 +54,7 @@ def fly(bs, limits, commands, pair):
     traf = bs.traf
     v, gap_m, high_m = limits["v_m_s"], limits["separation_m"], limits["vertical_m"]
     start_m = [altitude for _, _, _, altitude, _ in pair]
-    nearest_m, off_level_m, off_speed_m_s = math.inf, 0.0, 0.0
+    nearest_m, off_level_m, off_speeds_m_s = math.inf, 0.0, np.zeros(len(pair))
     for _ in range(int(limits["until_s"] / limits["step_s"])):
         bs.sim.step()
         bs.sim.state = bs.OP
@@ -62,11 +62,12 @@ def fly(bs, limits, commands, pair):
         if abs(traf.alt[0] - traf.alt[1]) < high_m:
             nearest_m = min(nearest_m, math.hypot(x0 - x1, y0 - y1))
         off_level_m = max(off_level_m, abs(traf.alt[0] - start_m[0]))
-        off_speed_m_s = max(off_speed_m_s, *abs(traf.tas - v))
+        off_speeds_m_s = np.maximum(off_speeds_m_s, abs(traf.tas - v))
     return {
         "is_lost": bool(nearest_m < gap_m),
         "off_level_m": round(float(off_level_m), 2),
-        "off_speed_m_s": round(float(off_speed_m_s), 3),
+        "off_speed_m_s": round(float(off_speeds_m_s.max()), 3),
+        "off_speeds_m_s": [round(float(speed), 3) for speed in off_speeds_m_s],
         "back_m": round(float(abs(traf.alt[0] - start_m[0])), 2),
         "back_m_s": round(float(max(abs(traf.tas - v))), 3),
     }
