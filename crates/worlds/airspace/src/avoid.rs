@@ -8,12 +8,15 @@
 //! bounds on errors. On a clear path there is no loss in this `dt`, however the other flies. If
 //! the path that is flown in the end is not clear, the pair is exempt until it is again.
 //!
+//! It is exempt only if no joint choice of plans of its group would have kept the path clear (`shield/search/joint_plans.rs`).
+//!
 //! To avoid that as far as possible, an airplane prefers paths that would stay clear for as long as it takes to turn
 //! back, if it flew straight on after `dt`, and the other all the time.
 
-use crate::flight::{Point, Pose2, distance_m};
+use crate::flight::{Point, Pose2, TimeDiscretization, distance_m};
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::shield::{ShieldedAircraft, TurnProfile, stays_apart_for};
+use crate::shield::{CandidateThreats, ShieldedAircraft, TurnProfile, stays_apart_for};
+use sidestep_kernel::EntityId;
 use sidestep_kernel::geometry::{add_scaled, norm};
 use std::f64::consts::PI;
 
@@ -48,6 +51,11 @@ impl<'a> NonCooperativeAvoidance<'a> {
         Self { aircraft, others, dtau_s }
     }
 
+    /// Returns whether there is nobody on its levels.
+    pub(crate) fn is_alone(&self) -> bool {
+        self.others.is_empty()
+    }
+
     /// Returns the profiles that an airplane may fly, by their places in `candidates`: those that are better
     /// than its fallback. Clear ones with a full margin keep their order, the others follow by clearance.
     pub(crate) fn allowed_profiles(
@@ -55,18 +63,37 @@ impl<'a> NonCooperativeAvoidance<'a> {
         candidates: &[TurnProfile],
         fallback: impl FnOnce() -> TurnProfile,
     ) -> Vec<usize> {
-        if self.others.is_empty() {
-            return (0..candidates.len()).collect();
+        match self.candidate_threats(candidates, fallback) {
+            Some(threats) => threats.preferred,
+            None => (0..candidates.len()).collect(),
         }
-        let required = self.clearance(&fallback());
+    }
+
+    /// Returns which profiles an airplane prefers to its fallback, likewise, and of whom each is not clear; `None` if there
+    /// is nobody on its levels.
+    pub(crate) fn candidate_threats(
+        &self,
+        candidates: &[TurnProfile],
+        fallback: impl FnOnce() -> TurnProfile,
+    ) -> Option<CandidateThreats> {
+        if self.others.is_empty() {
+            return None;
+        }
+        let (required, of_fallback) = self.clearance(&fallback());
         let full = PathClearance { is_clear: true, margin_m: 0.0 };
-        let clearances = candidates.iter().map(|profile| self.clearance(profile)).enumerate();
-        let mut better: Vec<(usize, PathClearance)> = clearances
-            .filter(|(_, clearance)| *clearance == full || *clearance > required)
-            .collect();
+        let mut of_candidates = Vec::with_capacity(candidates.len());
+        let mut better: Vec<(usize, PathClearance)> = Vec::new();
+        for (k, profile) in candidates.iter().enumerate() {
+            let (clearance, threats) = self.clearance(profile);
+            of_candidates.push(threats);
+            if clearance == full || clearance > required {
+                better.push((k, clearance));
+            }
+        }
         // A stable sort by falling clearance.
         better.sort_by(|(_, a), (_, b)| b.partial_cmp(a).unwrap_or(std::cmp::Ordering::Equal));
-        better.into_iter().map(|(k, _)| k).collect()
+        let preferred = better.into_iter().map(|(k, _)| k).collect();
+        Some(CandidateThreats { preferred, of_candidates, of_fallback })
     }
 
     /// Returns the others that could come too near on a path within `dt`.
@@ -80,13 +107,23 @@ impl<'a> NonCooperativeAvoidance<'a> {
         threats.map(|(one, _)| *one)
     }
 
-    fn clearance(&self, profile: &TurnProfile) -> PathClearance {
+    /// Returns the clearance of a path, and of whom it is not clear, except for those with which the airplane is an exempt
+    /// pair already.
+    fn clearance(&self, profile: &TurnProfile) -> (PathClearance, Vec<EntityId>) {
         let poses = self.poses_along(profile);
-        let margins_m = self.others.iter().map(|(_, one)| self.clearance_margin_m(&poses, one));
-        PathClearance {
-            is_clear: self.others.iter().all(|(_, one)| self.is_clear(&poses, profile, one)),
-            margin_m: margins_m.fold(0.0, f64::min),
+        let mut is_clear = true;
+        let mut margin_m: f64 = 0.0;
+        let mut threats = Vec::new();
+        for (_, one) in &self.others {
+            margin_m = margin_m.min(self.clearance_margin_m(&poses, one));
+            if !self.is_clear(&poses, profile, one) {
+                is_clear = false;
+                if self.aircraft.exempt.binary_search(&one.slot).is_err() {
+                    threats.push(one.slot);
+                }
+            }
         }
+        (PathClearance { is_clear, margin_m }, threats)
     }
 
     /// Returns its poses at the start of each step of a profile, and at the end, in the common air.
@@ -149,6 +186,24 @@ impl<'a> NonCooperativeAvoidance<'a> {
         let after_m = closest_approach_to_origin_m(from, relative_velocity, half_turn_s);
         (during_m.min(after_m) - desired_m).min(0.0)
     }
+}
+
+/// Returns what non-cooperative aircraft make of the candidates of each airplane of a group; nothing without any.
+pub(crate) fn group_threats(
+    timing: TimeDiscretization,
+    group: &[ShieldedAircraft],
+    candidates: &[Vec<TurnProfile>],
+    non_cooperative: &[NonCooperativeAircraft],
+) -> Vec<Option<CandidateThreats>> {
+    if non_cooperative.is_empty() {
+        return Vec::new();
+    }
+    let threats = |(aircraft, candidates): (&ShieldedAircraft, &Vec<TurnProfile>)| {
+        let avoidance = NonCooperativeAvoidance::new(aircraft, non_cooperative, timing.dtau_s);
+        let fallback = || aircraft.fallback_profile(timing.points_per_dt());
+        avoidance.candidate_threats(candidates, fallback)
+    };
+    group.iter().zip(candidates).map(threats).collect()
 }
 
 /// Returns the smallest distance from the origin to a point that moves straight on for some time.

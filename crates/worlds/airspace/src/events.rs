@@ -1,5 +1,6 @@
 //! The events of a run.
 
+use crate::shield::ShieldDecision;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::view::{LogEventKind, Vec3};
 use sidestep_kernel::{Cycle, EntityId};
@@ -225,4 +226,14 @@ impl Event {
     pub(super) fn sort_key(&self) -> (Cycle, EntityId, EventKind, EntityId) {
         (self.cycle, self.airplane, self.kind, self.other)
     }
+}
+/// Returns the event of an airplane for which the shield's search for a joint choice of plans, clear of a non-cooperative
+/// aircraft, has come to its limit.
+pub(crate) fn search_limit(
+    decision: &ShieldDecision,
+    airplane: EntityId,
+    cycle: Cycle,
+) -> Option<Event> {
+    let other = decision.unproved_threat?;
+    Some(Event::new_for_pair(cycle, EventKind::SearchLimit, airplane, other))
 }

@@ -134,7 +134,7 @@ impl ShieldOutcome<'_> {
         // It gave way to the plan that another one flies, to the one that the other preferred before it gave way too,
         // or to the orbit on which the other may always stay.
         let flown = |k: usize| {
-            let ShieldDecision { candidate, fallback } = self.decisions[k];
+            let ShieldDecision { candidate, fallback, .. } = self.decisions[k];
             self.plan(k, candidate, fallback, steps)
         };
         let first = |k: usize| {

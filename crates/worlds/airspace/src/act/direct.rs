@@ -1,15 +1,16 @@
 //! One process that decides for all airplanes of a group.
 
-use crate::avoid::NonCooperativeAvoidance;
+use crate::avoid::group_threats;
 use crate::baseline::ReactiveMemory;
 use crate::decide::{DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_for_group};
-use crate::events::{Event, EventKind};
+use crate::events::{Event, EventKind, search_limit};
 use crate::flight::KnownAircraft;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OptimizationStatus, OwnshipState, PilotMemory};
 use crate::scratch::PhaseContext;
 use crate::shield::{
-    PlanCertainty, PlanEnding, PlanRules, ShieldedAircraft, TurnProfile, filter_maneuvers,
+    PlanCertainty, PlanEnding, PlanRules, ShieldedAircraft, Surroundings, TurnProfile,
+    filter_maneuvers_beside,
 };
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{Cycle, EntitySlot};
@@ -25,7 +26,7 @@ pub(super) fn decide(
     let mut all = find_candidates(context, own, non_cooperative);
     context.scratch.decide_ns += clock.thread_cpu_ns() - start_ns;
     let maneuvers: Vec<Maneuver> = if world.shield {
-        shielded_maneuvers(context, own, non_cooperative, &all)
+        shielded_maneuvers(context, own, non_cooperative, &mut all)
     } else {
         own.iter().zip(&all).map(|(own, (_, one))| unshielded_maneuver(own, one)).collect()
     };
@@ -111,29 +112,29 @@ fn shielded_maneuvers(
     context: &PhaseContext<'_>,
     own: &[OwnshipState],
     non_cooperative: &[NonCooperativeAircraft],
-    all: &[(AirplaneControl, ManeuverCandidates)],
+    all: &mut [(AirplaneControl, ManeuverCandidates)],
 ) -> Vec<Maneuver> {
     let PhaseContext { world, now, .. } = *context;
     let group: Vec<ShieldedAircraft> =
         own.iter().map(|own| own.shielded_aircraft(world, now)).collect();
-    let dtau_s = world.timing.dtau_s;
-    let mut allowed: Vec<Vec<usize>> = Vec::with_capacity(own.len());
-    let mut profiles: Vec<Vec<TurnProfile>> = Vec::with_capacity(own.len());
-    for ((own, aircraft), (_, candidates)) in own.iter().zip(&group).zip(all) {
-        let places = NonCooperativeAvoidance::new(aircraft, non_cooperative, dtau_s)
-            .allowed_profiles(&candidates.profiles, || own.fallback_profile(world));
-        profiles.push(places.iter().map(|&k| candidates.profiles[k].clone()).collect());
-        allowed.push(places);
+    let profiles: Vec<Vec<TurnProfile>> =
+        all.iter().map(|(_, candidates)| candidates.profiles.clone()).collect();
+    let beside = Surroundings {
+        threats: group_threats(world.timing, &group, &profiles, non_cooperative),
+        ..Surroundings::default()
+    };
+    let rules = PlanRules {
+        steps: world.timing.points_per_dt(),
+        dtau_s: world.timing.dtau_s,
+        // In one process no message gets lost, so all fly the plans that they are given.
+        certainty: PlanCertainty::Sure,
+        ending: PlanEnding::AnyFallback,
+    };
+    let decisions = filter_maneuvers_beside(&group, &profiles, &beside, rules);
+    let mut maneuvers = Vec::with_capacity(own.len());
+    for ((decision, own), (control, candidates)) in decisions.into_iter().zip(own).zip(all) {
+        control.events.extend(search_limit(&decision, own.id, now));
+        maneuvers.push(Maneuver::from_decision(decision, candidates));
     }
-    let steps = world.timing.points_per_dt();
-    // In one process no message gets lost, so all fly the plans that they are given.
-    let ending = PlanEnding::AnyFallback;
-    let rules = PlanRules { steps, dtau_s, certainty: PlanCertainty::Sure, ending };
-    let decisions = filter_maneuvers(&group, &profiles, rules);
-    let decided = decisions.into_iter().zip(&allowed).zip(all);
-    decided
-        .map(|((decision, allowed), (_, candidates))| {
-            Maneuver::from_decision(decision, allowed, candidates)
-        })
-        .collect()
+    maneuvers
 }

@@ -7,13 +7,17 @@
 //! for this pair as for any other.
 
 use super::protect::shielded_aircraft;
+use crate::avoid::NonCooperativeAvoidance;
 use crate::events::{Event, EventKind};
+use crate::flight::TimeDiscretization;
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::scratch::PhaseContext;
 use crate::shield::{
     EntryFallbacks, EntryRole, Fallback, OrbitSide, ShieldedAircraft, entry_fallbacks,
     renewed_fallbacks,
 };
 use sidestep_kernel::EntitySlot;
+use std::sync::Arc;
 
 /// Ends the exemption of pairs that are safe by now. `flown` are the group's airplanes that the method
 /// flies, by id.
@@ -62,11 +66,12 @@ pub(super) fn renew_fallbacks(context: &mut PhaseContext<'_>, flown: &[EntitySlo
 /// only others are apart. Pairs without such fallbacks become exempt. `flown` are the group's airplanes that the method
 /// flies, by id.
 ///
-/// Airplanes that could be too near one that enters are in its group, so none is missed. `has_non_cooperative` says whether there are airplanes in the group that avoid nobody.
+/// Airplanes that could be too near one that enters are in its group, so none is missed. `non_cooperative` are those of the
+/// group that avoid nobody: one that flies already takes another fallback only if that is clear of no fewer of them.
 pub(super) fn assign_fallbacks(
     context: &mut PhaseContext<'_>,
     flown: &[EntitySlot],
-    has_non_cooperative: bool,
+    non_cooperative: &[NonCooperativeAircraft],
 ) {
     let PhaseContext { world, state, now, .. } = *context;
     // At the start, the first fallbacks are those of the compiled scenario.
@@ -88,13 +93,14 @@ pub(super) fn assign_fallbacks(
             one.choices = OrbitSide::BOTH.map(Fallback::from_side).into();
         }
     }
-    // Where messages get lost, others know the fallbacks of those that fly from having watched them; and beside
-    // non-cooperative aircraft another fallback may lead to one.
-    let others = if world.network.is_some() || has_non_cooperative {
-        EntryRole::Keep
-    } else {
-        EntryRole::Yield
-    };
+    // Where messages get lost, others know the fallbacks of those that fly from having watched them.
+    let others = if world.network.is_some() { EntryRole::Keep } else { EntryRole::Yield };
+    for (one, &slot) in group.iter_mut().zip(flown) {
+        // Another fallback may lead to a non-cooperative aircraft.
+        if !is_entering(slot) {
+            one.choices = choices_beside(one, non_cooperative, world.timing);
+        }
+    }
     let role = |&slot: &EntitySlot| if is_entering(slot) { EntryRole::Enter } else { others };
     let roles: Vec<EntryRole> = flown.iter().map(role).collect();
     let EntryFallbacks { fallbacks, too_close, unproved } = entry_fallbacks(&group, &roles);
@@ -114,4 +120,26 @@ pub(super) fn assign_fallbacks(
         let event = Event::new_for_pair(now, EventKind::SearchLimit, flown[i], flown[j]);
         context.scratch.events.push(event);
     }
+}
+
+/// Returns those of the fallbacks that an airplane may choose which are clear of all non-cooperative aircraft of which its
+/// stored one is clear, in the next `dt`.
+fn choices_beside(
+    aircraft: &ShieldedAircraft,
+    non_cooperative: &[NonCooperativeAircraft],
+    timing: TimeDiscretization,
+) -> Arc<[Fallback]> {
+    let avoidance = NonCooperativeAvoidance::new(aircraft, non_cooperative, timing.dtau_s);
+    if avoidance.is_alone() {
+        return Arc::clone(&aircraft.choices);
+    }
+    let threats = |fallback: Fallback| -> Vec<EntitySlot> {
+        let holding = ShieldedAircraft { fallback, ..aircraft.clone() };
+        let profile = holding.fallback_profile(timing.points_per_dt());
+        avoidance.threats(&profile).map(|one| one.slot).collect()
+    };
+    let present = threats(aircraft.fallback);
+    let is_as_clear =
+        |choice: &&Fallback| threats(**choice).iter().all(|one| present.contains(one));
+    aircraft.choices.iter().filter(is_as_clear).copied().collect()
 }

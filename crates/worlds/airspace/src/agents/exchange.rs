@@ -60,10 +60,12 @@ use super::participant::InvalidMessage;
 use super::traffic_state::{
     LastKnownState, OrbitState, PlanEnd, StateBeacon, TrafficPicture, record_beacon,
 };
+use crate::avoid::group_threats;
 use crate::flight::{FlightLevelRange, Pose2};
 use crate::shield::{
     AirDrift, CommonPlan, ExemptIds, Fallback, OrbitSide, PlanCertainty, PlanEnding, PlanRules,
-    SafeManeuver, ShieldDecision, ShieldedAircraft, TurnProfile, filter_maneuvers_beside,
+    SafeManeuver, ShieldDecision, ShieldedAircraft, Surroundings, TurnProfile,
+    filter_maneuvers_beside,
 };
 use serde::{Deserialize, Serialize};
 pub use setup::{ObservedAircraft, ShieldExchangeSetup};
@@ -377,7 +379,10 @@ impl ShieldExchangeAgent {
                 PlanCertainty::Mixable => PlanEnding::Orbit,
             },
         };
-        filter_maneuvers_beside(&group, &candidates, &common, rules)[mine]
+        let intruders = &self.setup.non_cooperative;
+        let threats = group_threats(self.setup.air.timing, &group, &candidates, intruders);
+        let beside = Surroundings { common, threats };
+        filter_maneuvers_beside(&group, &candidates, &beside, rules)[mine]
     }
 
     /// Returns the members with which an unheard airplane is an exempt pair, as far as they say so themselves.
@@ -400,7 +405,7 @@ impl ShieldExchangeAgent {
         let decision = match self.common_plan(self.me) {
             // A common plan leaves it predictable for all that do not hear it, in the cycles to come, too. That is worth
             // more than a better path now.
-            Some(common) => ShieldDecision { candidate: None, fallback: common.fallback },
+            Some(common) => ShieldDecision::settled(common.fallback),
             None => self.compute_own_decision(),
         };
         self.decision = Some(decision);
@@ -495,7 +500,7 @@ impl ShieldExchangeAgent {
 
     /// Ends the exchange: the airplane flies its plan, or its fallback.
     fn conclude(&mut self) {
-        let fallback = ShieldDecision { candidate: None, fallback: self.aircraft.fallback };
+        let fallback = ShieldDecision::settled(self.aircraft.fallback);
         let preferred = self.decision.unwrap_or(fallback);
         let all_agree = self.asked.iter().all(|&place| self.has_accepted_own_plan(place));
         let has_plan = matches!(self.members[self.me].plan, Some(Some(_)));

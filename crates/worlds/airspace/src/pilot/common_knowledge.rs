@@ -167,6 +167,10 @@ pub(super) fn shield_exchange_setup(
         vertical_m: world.vertical_m,
         now: percept.cycle,
         certainty: plan_certainty(world),
+        non_cooperative: match plan_certainty(world) {
+            PlanCertainty::Sure => percept.non_cooperative.clone(),
+            PlanCertainty::Mixable => Vec::new(),
+        },
         airplanes: world.airplanes.len(),
         max_proposal_bytes: world.max_proposal_bytes(),
         aircraft,

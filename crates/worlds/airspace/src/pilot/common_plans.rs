@@ -65,6 +65,7 @@ fn common_plans(world: &AirspaceWorld, percept: &Percept) -> Vec<Option<CommonPl
     let non_cooperative = &percept.non_cooperative;
     let candidates =
         candidates_for_group(world, &group, non_cooperative, &mut resolving, percept.cycle);
+    let steps = world.timing.points_per_dt();
     let mut aircraft = Vec::new();
     let mut profiles: Vec<Vec<TurnProfile>> = Vec::new();
     let mut wanted = Vec::new();
@@ -82,35 +83,29 @@ fn common_plans(world: &AirspaceWorld, percept: &Percept) -> Vec<Option<CommonPl
         }
         let avoidance = NonCooperativeAvoidance::new(&seen, non_cooperative, world.timing.dtau_s);
         let wishes = &candidates[place].profiles;
-        let allowed = avoidance.allowed_profiles(wishes, || fallback_profile(world, &seen));
+        let allowed = avoidance.allowed_profiles(wishes, || seen.fallback_profile(steps));
         profiles.push(allowed.iter().map(|&k| wishes[k].clone()).collect());
         aircraft.push(seen);
         wanted.push(Some(Wishes { place, allowed }));
     }
     let rules = PlanRules {
-        steps: world.timing.points_per_dt(),
+        steps,
         dtau_s: world.timing.dtau_s,
         certainty: plan_certainty(world),
         ending: PlanEnding::AnyFallback,
     };
     let mut plans = vec![None; tracked.len()];
     let decisions = filter_maneuvers(&aircraft, &profiles, rules);
-    for (k, ShieldDecision { candidate, fallback }) in decisions.into_iter().enumerate() {
+    for (k, ShieldDecision { candidate, fallback, .. }) in decisions.into_iter().enumerate() {
         let (Some(Wishes { place, allowed }), Some(candidate)) = (&wanted[k], candidate) else {
             continue;
         };
         let profile = profiles[k][candidate].clone();
         let candidate = allowed[candidate] as u32;
         // Where it moves as on its fallback, nobody could see which of the two it flies.
-        if profile != fallback_profile(world, &aircraft[k]) {
+        if profile != aircraft[k].fallback_profile(steps) {
             plans[*place] = Some(CommonPlan { candidate, profile, fallback });
         }
     }
     plans
-}
-
-/// Returns the turn profile of the stored fallback for one `dt`.
-fn fallback_profile(world: &AirspaceWorld, aircraft: &ShieldedAircraft) -> TurnProfile {
-    let omega_rad_s = aircraft.fallback.omega_rad_s(aircraft.orbit_rad_s);
-    TurnProfile { omegas_rad_s: vec![omega_rad_s; world.timing.points_per_dt()] }
 }

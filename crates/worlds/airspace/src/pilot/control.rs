@@ -92,13 +92,9 @@ impl Maneuver {
         matches!(self, Self::Profile { candidate: 0, .. })
     }
 
-    /// Returns the maneuver that follows from the shield's decision about those of the candidates that were `allowed`.
-    pub(crate) fn from_decision(
-        decision: ShieldDecision,
-        allowed: &[usize],
-        candidates: &ManeuverCandidates,
-    ) -> Self {
-        match decision.candidate.map(|k| allowed[k]) {
+    /// Returns the maneuver that follows from the shield's decision about candidates.
+    pub(crate) fn from_decision(decision: ShieldDecision, candidates: &ManeuverCandidates) -> Self {
+        match decision.candidate {
             Some(candidate) => Self::Profile {
                 candidate: candidate as u32,
                 profile: candidates.profiles[candidate].clone(),
@@ -119,9 +115,10 @@ impl Maneuver {
     pub(crate) fn to_shield_decision(&self, stored: Fallback) -> ShieldDecision {
         match *self {
             Self::Profile { candidate, fallback, .. } => {
-                ShieldDecision { candidate: Some(candidate as usize), fallback }
+                let candidate = Some(candidate as usize);
+                ShieldDecision { candidate, ..ShieldDecision::settled(fallback) }
             }
-            Self::Orbit => ShieldDecision { candidate: None, fallback: stored },
+            Self::Orbit => ShieldDecision::settled(stored),
         }
     }
 }

@@ -3,6 +3,7 @@
 mod conclude;
 mod cycle_state;
 
+use super::common_knowledge::plan_certainty;
 use super::common_plans::CommonPlans;
 use super::control::{AirplaneControl, Maneuver, PilotMemory};
 use super::conversations::{
@@ -22,6 +23,7 @@ use crate::avoid::NonCooperativeAvoidance;
 use crate::decide::{DecisionStrategy, ManeuverCandidates};
 use crate::events::{Event, EventKind};
 use crate::settings::Grouping;
+use crate::shield::PlanCertainty;
 use crate::world::AirspaceWorld;
 use cycle_state::{ConversationMismatch, PilotCyclePhase, PilotCycleState};
 use sidestep_kernel::EntityId;
@@ -436,12 +438,16 @@ impl NetworkAgent for Pilot {
     }
 }
 
-/// Returns the places of the candidates that non-cooperative aircraft leave to an airplane.
+/// Returns the places of the candidates that an airplane proposes: all that non-cooperative aircraft leave to it; or all,
+/// where all are sure to know all of each other, and order candidates alike.
 fn allowed_profiles(
     world: &AirspaceWorld,
     percept: &Percept,
     candidates: &ManeuverCandidates,
 ) -> Vec<usize> {
+    if plan_certainty(world) == PlanCertainty::Sure {
+        return (0..candidates.profiles.len()).collect();
+    }
     let aircraft = percept.own.shielded_aircraft(world, percept.cycle);
     let avoidance =
         NonCooperativeAvoidance::new(&aircraft, &percept.non_cooperative, world.timing.dtau_s);

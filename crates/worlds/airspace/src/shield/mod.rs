@@ -24,6 +24,8 @@
 //!    compatible by the invariant.
 //! 3. *Better again.* An airplane that does not fly its first candidate may take a better one in the same way. Each such
 //!    exchange keeps all pairs compatible.
+//!    Then, as far as some plan is not clear of a non-cooperative aircraft, all plans are exchanged for such a joint choice
+//!    if there is any (`search/joint_plans.rs`), and it is compatible, too.
 //! 4. *Step.* All fly `dt` of their plans, and store the fallback at its end. The plans were
 //!    compatible, so no two came nearer than `R` during `dt`, and the stored fallbacks keep the
 //!    invariant.
@@ -59,7 +61,7 @@
 //! more than `R` (by `MARGIN_M`), so that rounding never adds up to a loss.
 
 #[cfg(test)]
-mod area_tests;
+pub(crate) mod area_tests;
 mod areas;
 mod change;
 mod curvature;
@@ -74,6 +76,8 @@ mod joint_fallbacks;
 mod neighbors;
 mod orbit;
 mod safe_maneuver;
+#[cfg(test)]
+mod scenario_tests;
 mod search;
 mod shear;
 mod shielded_aircraft;
@@ -98,7 +102,7 @@ pub use orbit::OrbitSide;
 pub(crate) use orbit::stays_apart_for;
 pub(crate) use safe_maneuver::SafeManeuver;
 pub use safe_maneuver::{CommonPlan, TurnProfile};
-pub(crate) use search::filter_maneuvers_beside;
+pub(crate) use search::{CandidateThreats, Surroundings, filter_maneuvers_beside};
 pub use search::{PlanCertainty, PlanEnding, PlanRules, ShieldDecision, filter_maneuvers};
 pub(crate) use shear::renewed_fallbacks;
 pub(crate) use shielded_aircraft::ExemptIds;

@@ -1,11 +1,14 @@
 //! The search for plans that are pairwise compatible.
 
+mod joint_plans;
+
 use super::areas::ClearFallbacks;
 use super::fallback::Fallback;
 use super::neighbors::neighbors;
 use super::safe_maneuver::{CommonPlan, PlanSource, SafeManeuver, TurnProfile};
 use super::shielded_aircraft::ShieldedAircraft;
 use rustc_hash::FxHashMap;
+use sidestep_kernel::EntityId;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
@@ -16,6 +19,28 @@ pub struct ShieldDecision {
     pub candidate: Option<usize>,
     /// The fallback to store after that.
     pub fallback: Fallback,
+    /// A non-cooperative aircraft of which the airplane is not clear, though some joint choice of plans might be: the search
+    /// for one has come to its limit.
+    pub unproved_threat: Option<EntityId>,
+}
+
+impl ShieldDecision {
+    /// Returns the decision to fly the stored fallback, or what all compute for the airplane, and to store a fallback.
+    pub fn settled(fallback: Fallback) -> Self {
+        Self { candidate: None, fallback, unproved_threat: None }
+    }
+}
+
+/// What the candidates of an airplane are worth beside non-cooperative aircraft, which may come too near on its path in
+/// the next `dt`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct CandidateThreats {
+    /// The candidates that it prefers to its fallback, the best one first.
+    pub(crate) preferred: Vec<usize>,
+    /// The non-cooperative ones of which each candidate is not clear, by id.
+    pub(crate) of_candidates: Vec<Vec<EntityId>>,
+    /// Those of which its fallback is not clear.
+    pub(crate) of_fallback: Vec<EntityId>,
 }
 
 /// The certainty that all airplanes fly the plans they are given.
@@ -74,25 +99,38 @@ pub fn filter_maneuvers(
     candidates: &[Vec<TurnProfile>],
     rules: PlanRules,
 ) -> Vec<ShieldDecision> {
-    filter_maneuvers_beside(group, candidates, &vec![None; group.len()], rules)
+    let beside = Surroundings::default();
+    filter_maneuvers_beside(group, candidates, &beside, rules)
 }
 
-/// Decides likewise where all compute a plan in `common` for some airplanes, which these fly rather than their fallbacks.
-/// Those plans, and the fallbacks of all, are pairwise compatible in any mixture.
+/// What there is beside the airplanes of a group and their candidates, by airplane; empty where there is nothing.
+#[derive(Debug, Default)]
+pub(crate) struct Surroundings {
+    /// The plan that all compute for an airplane, which it flies rather than its fallback. Those plans, and the fallbacks
+    /// of all, are pairwise compatible in any mixture.
+    pub(crate) common: Vec<Option<CommonPlan>>,
+    /// What non-cooperative aircraft make of its candidates.
+    pub(crate) threats: Vec<Option<CandidateThreats>>,
+}
+
+/// Decides likewise beside common plans and non-cooperative aircraft.
 pub(crate) fn filter_maneuvers_beside(
     group: &[ShieldedAircraft],
     candidates: &[Vec<TurnProfile>],
-    common: &[Option<CommonPlan>],
+    beside: &Surroundings,
     rules: PlanRules,
 ) -> Vec<ShieldDecision> {
-    let mut search = ShieldSearch::new(group, candidates, common, rules);
+    let mut search = ShieldSearch::new(group, candidates, beside, rules);
     search.resolve_conflicts();
     search.improve_plans();
-    search
-        .plans
-        .iter()
-        .map(|p| ShieldDecision { candidate: p.candidate(), fallback: p.fallback() })
-        .collect()
+    let unproved = search.keep_clear();
+    let each = search.plans.iter().enumerate();
+    each.map(|(i, plan)| ShieldDecision {
+        candidate: plan.candidate(),
+        fallback: plan.fallback(),
+        unproved_threat: unproved.iter().find(|(of, _)| *of == i).map(|(_, other)| *other),
+    })
+    .collect()
 }
 
 /// Plans that replace others, by the place of the airplane in its group.
@@ -106,6 +144,8 @@ struct ShieldSearch<'a> {
     fallbacks: Vec<SafeManeuver>,
     /// The plans that all compute, of those that have one.
     common: Vec<Option<SafeManeuver>>,
+    /// What non-cooperative aircraft make of candidates; empty where there are none.
+    threats: &'a [Option<CandidateThreats>],
     /// The candidates of each airplane beside areas; none for those that have none around them.
     beside_areas: Vec<Option<CandidatesBesideAreas>>,
     /// Airplanes by rising rank.
@@ -126,10 +166,11 @@ struct CandidatesBesideAreas {
 }
 
 impl CandidatesBesideAreas {
-    /// Returns the plans that an airplane may fly; none where there are no areas around it.
+    /// Returns the plans that an airplane may fly, of those in `preferred`; none where there are no areas around it.
     fn new(
         aircraft: &ShieldedAircraft,
         profiles: &[TurnProfile],
+        preferred: impl Iterator<Item = usize>,
         rules: PlanRules,
     ) -> Option<Self> {
         if !aircraft.has_areas() {
@@ -143,12 +184,22 @@ impl CandidatesBesideAreas {
             found.fallbacks.retain(|fallback| rules.ending.allows(*fallback));
             clear.push(found);
         }
-        let mut order: Vec<usize> =
-            (0..clear.len()).filter(|&k| !clear[k].fallbacks.is_empty()).collect();
+        let mut order: Vec<usize> = preferred.filter(|&k| !clear[k].fallbacks.is_empty()).collect();
         // A stable sort.
         order.sort_by_key(|&k| !clear[k].is_clear);
         Some(Self { order, clear })
     }
+}
+
+/// Returns the numbers of the candidates that an airplane prefers to its fallback, of as many as it has.
+fn preferred_numbers(
+    threats: &[Option<CandidateThreats>],
+    i: usize,
+    candidates: usize,
+) -> impl Iterator<Item = usize> + use<'_> {
+    let preferred = threats.get(i).and_then(Option::as_ref).map(|threats| &threats.preferred[..]);
+    let all = 0..if preferred.is_some() { 0 } else { candidates };
+    preferred.unwrap_or_default().iter().copied().chain(all)
 }
 
 /// A plan among those of a group.
@@ -169,18 +220,22 @@ impl<'a> ShieldSearch<'a> {
     fn new(
         group: &'a [ShieldedAircraft],
         candidates: &'a [Vec<TurnProfile>],
-        common: &[Option<CommonPlan>],
+        beside: &'a Surroundings,
         rules: PlanRules,
     ) -> Self {
         let PlanRules { steps, dtau_s, .. } = rules;
+        let threats = &beside.threats;
         let fallbacks: Vec<SafeManeuver> = group
             .iter()
             .map(|aircraft| SafeManeuver::on_fallback(aircraft.clone(), steps, dtau_s))
             .collect();
         let common: Vec<Option<SafeManeuver>> = group
             .iter()
-            .zip(common)
-            .map(|(aircraft, common)| Some(common.as_ref()?.to_maneuver(aircraft.clone(), dtau_s)))
+            .enumerate()
+            .map(|(i, aircraft)| {
+                let common = beside.common.get(i)?.as_ref()?;
+                Some(common.to_maneuver(aircraft.clone(), dtau_s))
+            })
             .collect();
         let plans: Vec<SafeManeuver> = common
             .iter()
@@ -190,7 +245,11 @@ impl<'a> ShieldSearch<'a> {
         let beside_areas = group
             .iter()
             .zip(candidates)
-            .map(|(aircraft, profiles)| CandidatesBesideAreas::new(aircraft, profiles, rules))
+            .enumerate()
+            .map(|(i, (aircraft, profiles))| {
+                let preferred = preferred_numbers(threats, i, profiles.len());
+                CandidatesBesideAreas::new(aircraft, profiles, preferred, rules)
+            })
             .collect();
         let mut by_rank: Vec<usize> = (0..group.len()).collect();
         by_rank.sort_unstable_by_key(|&i| group[i].rank);
@@ -202,6 +261,7 @@ impl<'a> ShieldSearch<'a> {
             plans,
             fallbacks,
             common,
+            threats,
             beside_areas,
             by_rank,
             near,
@@ -217,10 +277,11 @@ impl<'a> ShieldSearch<'a> {
     }
 
     /// Returns the numbers of the candidates of an airplane, the one that it flies most readily first.
-    fn candidate_numbers(&self, i: usize) -> impl DoubleEndedIterator<Item = usize> + use<'_> {
+    fn candidate_numbers(&self, i: usize) -> impl Iterator<Item = usize> + use<'_, 'a> {
         let beside_areas = self.beside_areas[i].as_ref().map(|one| &one.order[..]);
-        let all = 0..if beside_areas.is_some() { 0 } else { self.candidates[i].len() };
-        beside_areas.unwrap_or_default().iter().copied().chain(all)
+        let all = if beside_areas.is_some() { 0 } else { self.candidates[i].len() };
+        let preferred = (all > 0).then(|| preferred_numbers(self.threats, i, all));
+        beside_areas.unwrap_or_default().iter().copied().chain(preferred.into_iter().flatten())
     }
 
     /// Returns the fallbacks that a plan of an airplane may end with, in the order in which they are tried.

@@ -13,7 +13,7 @@ const MAX_LEAD_S: f64 = 60.0;
 /// Seconds after which all orbit, and then have been around several times.
 const ALL_ORBIT_S: usize = 400;
 
-fn rules(certainty: PlanCertainty) -> PlanRules {
+pub(super) fn rules(certainty: PlanCertainty) -> PlanRules {
     PlanRules { steps: STEPS, dtau_s: DTAU_S, certainty, ending: PlanEnding::AnyFallback }
 }
 
@@ -68,7 +68,7 @@ fn some_flyers() -> impl Strategy<Value = Vec<ShieldedAircraft>> {
 }
 
 /// Airplanes with fallbacks that are apart; those that clash are left out.
-fn with_fallbacks(mut group: Vec<ShieldedAircraft>) -> Vec<ShieldedAircraft> {
+pub(super) fn with_fallbacks(mut group: Vec<ShieldedAircraft>) -> Vec<ShieldedAircraft> {
     loop {
         let first = first_fallbacks(&group);
         match first.too_close.first() {
@@ -172,7 +172,7 @@ proptest! {
             for ((decision, follows), aircraft) in decisions.iter_mut().zip(follow).zip(&group) {
                 if !follows {
                     let rest = aircraft.fallback.after_cycle();
-                    *decision = ShieldDecision { candidate: None, fallback: rest };
+                    *decision = ShieldDecision::settled(rest);
                 }
             }
         }

@@ -3,6 +3,7 @@
 use super::Proposal;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
 use crate::flight::{FlightConditions, FlightLevelRange, TurnLimit, WindField};
+use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{CommonPlan, PlanCertainty, ShieldedAircraft, TurnProfile};
 use sidestep_kernel::stream::philox4x32;
 use sidestep_kernel::{Cycle, EntityId};
@@ -59,6 +60,9 @@ pub struct ShieldExchangeSetup {
     pub airplanes: usize,
     /// Largest number of bytes that a proposal should take; none where the radio has no budget.
     pub max_proposal_bytes: Option<usize>,
+    /// The non-cooperative aircraft beside the group; none where messages may get lost, and each airplane proposes what
+    /// they leave to it.
+    pub non_cooperative: Vec<NonCooperativeAircraft>,
     /// All airplanes of the group as they can be seen, by rising id.
     pub aircraft: Vec<ObservedAircraft>,
 }

@@ -12,11 +12,12 @@ use crate::decide::{
     DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_by_velocity,
     candidates_from_choice, decide_by_predictions,
 };
-use crate::events::{Event, EventKind};
+use crate::events::{Event, EventKind, search_limit};
 use crate::flight::KnownAircraft;
 use crate::pilot::common_knowledge::{beacon, ownship, unheard_as_non_cooperative};
 use crate::pilot::control::{Maneuver, OptimizationStatus};
 use crate::pilot::conversations::ConversationOutcome;
+use crate::shield::ShieldDecision;
 
 impl Pilot {
     /// Stores the group that it has found; without an outcome it is alone.
@@ -149,9 +150,12 @@ impl Pilot {
                     let event = Event::new(state.percept.cycle, EventKind::HeldBack, self.id);
                     state.control.events.push(event);
                 }
+                state.control.events.extend(search_limit(&decision, self.id, state.percept.cycle));
+                let candidate = decision.candidate.map(|k| allowed[k]);
+                let decision = ShieldDecision { candidate, ..decision };
                 state.control.maneuver = match common {
                     Some(plan) => Maneuver::from_common_plan(plan),
-                    None => Maneuver::from_decision(decision, allowed, &state.candidates),
+                    None => Maneuver::from_decision(decision, &state.candidates),
                 };
                 contacts
             }
