@@ -133,6 +133,18 @@ pub fn normal(draws: &mut Draws) -> f64 {
     radius * math::cos(std::f64::consts::TAU * draws.uniform())
 }
 
+/// Returns two independent standard normal values (Box-Muller) from the four words of one draw.
+pub fn normal_pair(words: [u32; 4]) -> [f64; 2] {
+    // 53 bits of each two words, as `Draws::uniform` has them.
+    let uniform = |low: u32, high: u32| {
+        let bits = (u64::from(low) | u64::from(high) << 32) >> 11;
+        bits as f64 * (1.0 / (1u64 << 53) as f64)
+    };
+    let radius = (-2.0 * math::ln(1.0 - uniform(words[0], words[1]))).sqrt();
+    let angle_rad = std::f64::consts::TAU * uniform(words[2], words[3]);
+    [radius * math::cos(angle_rad), radius * math::sin(angle_rad)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,5 +221,21 @@ mod tests {
         // Four standard errors, fixed seed.
         assert!(mean.abs() < 4.0 / 2e4f64.sqrt());
         assert!((variance - 1.0).abs() < 4.0 * (2.0f64 / 2e4).sqrt());
+    }
+
+    #[test]
+    fn pairs_of_normals_have_mean_zero_variance_one_and_no_correlation() {
+        let streams = Streams::new(Seed(9));
+        let pairs: Vec<[f64; 2]> =
+            (0..20_000).map(|k| normal_pair(streams.block(0, k, Purpose(0), 0))).collect();
+        let mean_of = |value: fn(&[f64; 2]) -> f64| pairs.iter().map(value).sum::<f64>() / 2e4;
+        // Four standard errors, fixed seed.
+        let tolerance = 4.0 / 2e4f64.sqrt();
+        assert!(mean_of(|pair| pair[0]).abs() < tolerance);
+        assert!(mean_of(|pair| pair[1]).abs() < tolerance);
+        assert!(mean_of(|pair| pair[0] * pair[1]).abs() < tolerance);
+        for variance in [mean_of(|pair| pair[0] * pair[0]), mean_of(|pair| pair[1] * pair[1])] {
+            assert!((variance - 1.0).abs() < 4.0 * (2.0f64 / 2e4).sqrt());
+        }
     }
 }

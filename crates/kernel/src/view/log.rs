@@ -161,6 +161,8 @@ log_event_kinds! {
     LowHold = "low-hold",
     /// A body is in the air for longer than its fuel lasts; the value is how long that lasts.
     EnduranceExceedance = "endurance-exceedance",
+    /// A body drops its track of another one, of which it receives no reports; the value is the age of the last one.
+    TrackDropped = "track-dropped",
 }
 
 /// The severity of an event, rising.

@@ -31,11 +31,11 @@ mod step;
 use super::decide::{ManeuverCandidates, straight_profile};
 use super::deploy;
 use super::join::CooperativeGroup;
-use super::non_cooperative::NonCooperativeAircraft;
-use super::perceive::{known_aircraft, non_cooperative_aircraft, ownship_state};
+use super::perceive::{known_aircraft, ownship_state};
 use super::pilot::{AirplaneControl, OwnshipState};
 use super::scratch::PhaseContext;
 use super::settings::Deployment;
+use super::surveillance::PerceivedTraffic;
 use super::trace::GroupDecisions;
 use controls::{FlownProfile, apply_controls};
 use flight::{AircraftCycleMotion, FlightPathSource};
@@ -65,8 +65,9 @@ pub(super) fn act(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
 fn fly(context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
     let PhaseContext { world, state, now, .. } = *context;
     let flown = prepare_decisions(context, group);
-    let non_cooperative = non_cooperative_aircraft(context, group);
-    let mut profiles = decide_flown_profiles(context, &flown, &non_cooperative).into_iter();
+    let traffic = PerceivedTraffic::new(context, group);
+    traffic.record(context, group);
+    let mut profiles = decide_flown_profiles(context, &flown, &traffic).into_iter();
     holds::report_holds(context, &flown.ids);
     let flights = group.iter().map(|&slot| {
         let maneuver = match &world.airplanes[slot as usize].track {
@@ -122,9 +123,10 @@ pub(super) fn prepare_decisions(
 fn decide_flown_profiles(
     context: &mut PhaseContext<'_>,
     flown: &CooperativeGroup,
-    non_cooperative: &[NonCooperativeAircraft],
+    traffic: &PerceivedTraffic,
 ) -> Vec<FlownProfile> {
     let PhaseContext { world, state, now, .. } = *context;
+    let non_cooperative = &traffic.non_cooperative[..];
     let own: Vec<OwnshipState> =
         flown.ids.iter().map(|&slot| ownship_state(context, slot)).collect();
     let contacts = context.scratch.trace.as_ref().map(|trace| state.traffic_picture(trace.slot));
@@ -133,13 +135,15 @@ fn decide_flown_profiles(
             (state.take_controls(&flown.ids), vec![ManeuverCandidates::default(); own.len()])
         } else {
             let all = match world.deployment {
-                Deployment::Direct => direct::decide(context, &own, non_cooperative),
+                Deployment::Direct => direct::decide(context, &own, traffic),
                 _ => deploy::decide_group(context, flown, non_cooperative),
             };
             all.into_iter().map(|(control, considered)| (Some(control), considered)).unzip()
         };
     if let Some(trace) = &mut context.scratch.trace {
         trace.contacts = contacts.unwrap_or_default();
+        let observations = traffic.observations.as_ref();
+        trace.tracks = observations.map(|all| all.tracks_of(trace.slot).to_vec());
         let decided = GroupDecisions {
             own: &own,
             non_cooperative,
@@ -148,7 +152,7 @@ fn decide_flown_profiles(
         };
         trace.record_decisions(world, now, &decided);
     }
-    let profiles = apply_controls(context, &own, non_cooperative, controls);
+    let profiles = apply_controls(context, &own, traffic, controls);
     if let Some(trace) = &mut context.scratch.trace {
         trace.flown = trace.own_part(&profiles).map(|flown| flown.profile.clone());
     }

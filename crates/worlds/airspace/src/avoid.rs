@@ -40,11 +40,11 @@ pub(crate) struct NonCooperativeAvoidance<'a> {
 impl<'a> NonCooperativeAvoidance<'a> {
     pub(crate) fn new(
         aircraft: &'a ShieldedAircraft,
-        non_cooperative: &'a [NonCooperativeAircraft],
+        non_cooperative: impl IntoIterator<Item = &'a NonCooperativeAircraft>,
         dtau_s: f64,
     ) -> Self {
         let others = non_cooperative
-            .iter()
+            .into_iter()
             .filter(|one| one.levels.overlaps(&aircraft.levels, aircraft.vertical_m))
             .map(|one| (one, one.in_frame(aircraft.frame)))
             .collect();

@@ -30,6 +30,8 @@ use preferences::rank_straight_first;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Game, find_minimum, is_at_bound, optimize, tight_lower_bound};
 use sidestep_kernel::{Cycle, EntityId};
+use velocity::OthersAt;
+pub(super) use velocity::non_cooperative_state;
 
 /// One optimization: of a group, in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -211,7 +213,23 @@ pub(super) fn candidates_by_velocity(
     memory: &mut [ReactiveMemory],
     now: Cycle,
 ) -> Vec<ManeuverCandidates> {
-    let profiles = velocity::profiles_by_velocity(world, group, non_cooperative, memory, now);
+    let others_at = |seconds: f64| {
+        let each = non_cooperative.iter();
+        each.map(|one| non_cooperative_state(world, one, seconds)).collect()
+    };
+    candidates_beside_others(world, group, &others_at, memory, now)
+}
+
+/// Returns the same for airplanes with all around them, of which `others_at` gives the states some seconds after the
+/// start of the cycle.
+pub(super) fn candidates_beside_others(
+    world: &AirspaceWorld,
+    group: &[KnownAircraft],
+    others_at: &OthersAt<'_>,
+    memory: &mut [ReactiveMemory],
+    now: Cycle,
+) -> Vec<ManeuverCandidates> {
+    let profiles = velocity::profiles_by_velocity(world, group, others_at, memory, now);
     let each = profiles.into_iter().zip(memory);
     each.map(|(profiles, memory)| ManeuverCandidates {
         command: memory.command,

@@ -53,6 +53,9 @@ pub enum EventKind {
     LowHold,
     /// An airplane is in the air for longer than its endurance; the value is its endurance in seconds.
     EnduranceExceedance,
+    /// An airplane drops its track of another one, because it has received no report of that one for the coast time; the
+    /// value is the age of the last report in seconds.
+    TrackDropped,
 }
 
 /// The quantity that the value of an event measures: each has a column of its own in the table.
@@ -90,7 +93,8 @@ impl EventKind {
             | Self::AreaExempt
             | Self::LevelOff
             | Self::LowHold
-            | Self::EnduranceExceedance => Some(EventQuantity::Number),
+            | Self::EnduranceExceedance
+            | Self::TrackDropped => Some(EventQuantity::Number),
             Self::Orbit
             | Self::Unheard
             | Self::Deadline
@@ -102,7 +106,7 @@ impl EventKind {
     }
 
     /// All kinds; the table of events stores places in this list.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::LossOfSeparation,
         Self::Arrival,
         Self::Override,
@@ -121,6 +125,7 @@ impl EventKind {
         Self::LevelOff,
         Self::LowHold,
         Self::EnduranceExceedance,
+        Self::TrackDropped,
     ];
 
     /// Returns the kind that it is for viewers, which know no world.
@@ -144,6 +149,7 @@ impl EventKind {
             Self::LevelOff => LogEventKind::LevelOff,
             Self::LowHold => LogEventKind::LowHold,
             Self::EnduranceExceedance => LogEventKind::EnduranceExceedance,
+            Self::TrackDropped => LogEventKind::TrackDropped,
         }
     }
 
@@ -168,6 +174,7 @@ impl EventKind {
             Self::LevelOff => "level-off",
             Self::LowHold => "low-hold",
             Self::EnduranceExceedance => "endurance-exceedance",
+            Self::TrackDropped => "track-dropped",
         }
     }
 }

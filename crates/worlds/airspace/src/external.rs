@@ -8,10 +8,10 @@ use super::external_action::ExternalAction;
 use super::flight::KnownAircraft;
 use super::join::CooperativeGroup;
 use super::method::MethodKind;
-use super::non_cooperative::NonCooperativeAircraft;
-use super::perceive::{known_aircraft, non_cooperative_aircraft};
+use super::perceive::known_aircraft;
 use super::scratch::{PhaseContext, Scratch};
 use super::state::AirspaceState;
+use super::surveillance::PerceivedTraffic;
 use super::world::AirspaceWorld;
 use super::{act, join};
 use observation::{AgentKnowledge, VisibleAircraft};
@@ -106,7 +106,7 @@ impl AirspaceWorld {
         // Airplanes that decide in no group of this cycle keep this padding.
         let padding = AgentKnowledge::default();
         (0..agents.len()).for_each(|row| padding.write(self, row, buffers));
-        self.for_each_group(state, now, |context, group, non_cooperative| {
+        self.for_each_group(state, now, |context, group, traffic| {
             if group.ids.iter().all(|slot| agents.binary_search(slot).is_err()) {
                 return;
             }
@@ -115,10 +115,12 @@ impl AirspaceWorld {
                 .iter()
                 .map(|&slot| known_aircraft(self, context.state, now, slot))
                 .collect();
-            let all = VisibleAircraft::from_group(context, &members, non_cooperative);
+            let all = VisibleAircraft::from_group(context, &members, &traffic.non_cooperative);
             for own in &members {
                 if let Ok(row) = agents.binary_search(&own.slot) {
-                    AgentKnowledge::new(context, own, &all).write(self, row, buffers);
+                    let tracked = VisibleAircraft::from_tracks(context, own.slot, traffic);
+                    let others = tracked.as_deref().unwrap_or(&all);
+                    AgentKnowledge::new(context, own, others).write(self, row, buffers);
                 }
             }
         });
@@ -131,7 +133,7 @@ impl AirspaceWorld {
         &self,
         state: &AirspaceState,
         now: Cycle,
-        mut visit: impl FnMut(&PhaseContext<'_>, &CooperativeGroup, &[NonCooperativeAircraft]),
+        mut visit: impl FnMut(&PhaseContext<'_>, &CooperativeGroup, &PerceivedTraffic),
     ) {
         let copy = AirspaceState::restore(self, &state.snapshot(now));
         let clock = ManualClock::default();
@@ -151,7 +153,7 @@ impl AirspaceWorld {
             group.retain(|&slot| copy.is_active(self, slot, now));
             group.sort_unstable();
             let controlled = act::prepare_decisions(context, &group);
-            visit(context, &controlled, &non_cooperative_aircraft(context, &group));
+            visit(context, &controlled, &PerceivedTraffic::new(context, &group));
         }
     }
 }

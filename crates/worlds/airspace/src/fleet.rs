@@ -72,8 +72,8 @@ impl AirspaceWorld {
     /// Returns the percepts of the airplanes that decide in cycle `now`.
     pub(crate) fn percepts(&self, state: &AirspaceState, now: Cycle) -> Vec<Percept> {
         let mut all = Vec::new();
-        self.for_each_group(state, now, |context, flown, non_cooperative| {
-            all.extend(flown.percepts(context, non_cooperative));
+        self.for_each_group(state, now, |context, flown, traffic| {
+            all.extend(flown.percepts(context, &traffic.non_cooperative));
         });
         all.sort_unstable_by_key(|percept| percept.own.id);
         all

@@ -11,7 +11,7 @@ use super::flight::{
 };
 use super::settings::{
     AbilityKeys, AltitudeLimit, Bank, ChangeList, PositiveRate, PositiveTime, SeparationM, Speed,
-    SpeedLimit, SurveillanceCategory, TurnCount, TurnRate, ability_keys,
+    SpeedLimit, SurveillanceCategory, TurnCount, TurnRate, VelocityCategory, ability_keys,
 };
 use limits::{LevelChange, Mistake, level_order_mistake, speed_order_mistake};
 use schemars::JsonSchema;
@@ -90,6 +90,8 @@ pub(super) struct AirplaneSection {
     pub(super) nac_p: Option<SurveillanceCategory>,
     /// Category of integrity of its reported positions, NIC of ADS-B, if not that of all.
     pub(super) nic: Option<SurveillanceCategory>,
+    /// Category of accuracy of its reported velocities, NACv of ADS-B, if not that of all.
+    pub(super) nac_v: Option<VelocityCategory>,
     /// Priority from 0 to 3: it has right of way over airplanes with a smaller one.
     pub(super) priority: Option<Integer<0, 3>>,
     non_cooperative: Option<bool>,

@@ -5,6 +5,7 @@ mod areas;
 mod sections;
 #[cfg(test)]
 mod tests;
+mod tracks;
 
 use super::act;
 use super::flight::{KnownAircraft, Point};
@@ -12,6 +13,7 @@ use super::join;
 use super::perceive::{self, observed_pose};
 use super::scratch::{PhaseContext, Scratch};
 use super::state::AirspaceState;
+use super::surveillance::each_decides_by_tracks;
 use super::trace::InspectionTrace;
 use super::world::AirspaceWorld;
 use crate::kinds;
@@ -83,6 +85,7 @@ impl Inspector<'_> {
         self.add_state_section(&mut inspection);
         self.add_group(&mut inspection);
         self.add_knowledge_section(&mut inspection);
+        self.add_tracks_section(&mut inspection);
         self.add_decision(&mut inspection);
         self.add_shield_section(&mut inspection);
         self.add_areas_section(&mut inspection);
@@ -193,6 +196,9 @@ impl Inspector<'_> {
         }
         let how = match self.world.network {
             Some(_) => "by messages, which may get lost",
+            None if each_decides_by_tracks(self.world) && self.world.surveillance.is_some() => {
+                "by reports of others, of which it has tracks"
+            }
             None => "all of its group as they are now",
         };
         inspection.add_section(FactSection::new("Knows of others").fact("how", how).table(table));

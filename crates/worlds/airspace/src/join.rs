@@ -125,7 +125,11 @@ pub(super) fn join(context: &mut PhaseContext<'_>, bodies: Range<usize>, groups:
 }
 
 /// Returns whether two airplanes have to avoid each other.
-fn have_to_avoid_each_other(context: &PhaseContext<'_>, a: EntitySlot, b: EntitySlot) -> bool {
+pub(super) fn have_to_avoid_each_other(
+    context: &PhaseContext<'_>,
+    a: EntitySlot,
+    b: EntitySlot,
+) -> bool {
     let PhaseContext { world, state, .. } = context;
     let at_a = state.airplanes[a as usize].pose().at;
     let at_b = state.airplanes[b as usize].pose().at;

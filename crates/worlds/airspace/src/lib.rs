@@ -57,6 +57,7 @@ mod scratch;
 pub mod settings;
 pub mod shield;
 pub mod state;
+pub mod surveillance;
 mod text;
 mod trace;
 pub mod traffic;

@@ -5,6 +5,7 @@ use super::encounters::Encounters;
 use super::events::{Event, EventKind};
 use super::flight::FlightPhase;
 use super::state::{AirplaneState, AirspaceState, PairRecord};
+use super::surveillance::ObservationCounts;
 use super::world::AirspaceWorld;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
@@ -33,6 +34,8 @@ pub struct Counters {
     pub exempt_areas: BTreeMap<(EntityId, u32), Cycle>,
     /// Conflicts and other encounters of pairs; none where they are not measured.
     pub encounters: Encounters,
+    /// Observations by surveillance; none where all see all.
+    pub observed: ObservationCounts,
 }
 
 /// The time of an airplane where an area does not permit it to be.
@@ -233,6 +236,14 @@ metrics! {
         /// Times that the shield did not clear a level or a speed that a method commands: the airplane kept its speed for one
         /// `dt`, or leveled off short of a level; none where methods command neither.
         pub commands_held: Option<u64> => "levels and speeds held by the shield",
+        /// Fraction of observations in which the observer had a track, 0 to 1. One is of another airplane near an observer in
+        /// a cycle, if that one does not tell where it is; none without `airspace.surveillance`.
+        pub track_availability: Option<f64> => "availability of tracks",
+        /// Mean age of these tracks: the time since the last report. In seconds.
+        pub mean_track_age_s: Option<f64> => "mean age of tracks",
+        /// Times that an airplane dropped its track of another one, of which it received no reports; none without
+        /// `airspace.surveillance`.
+        pub tracks_dropped: Option<u64> => "tracks dropped",
         /// Times that an airplane lost contact with another one.
         pub contacts_lost: u64 => "contacts lost",
         /// Times that an agent ran out of time.
@@ -625,6 +636,12 @@ pub(crate) fn metrics(
             .then(|| counters.event_count(EventKind::EnduranceExceedance)),
         shield_held_back: counters.event_count(EventKind::HeldBack),
         commands_held: world.has_commands().then(|| counters.event_count(EventKind::CommandHeld)),
+        track_availability: track_availability(world, counters.observed),
+        mean_track_age_s: mean(
+            counters.observed.age_steps as f64 * world.timing.dtau_s,
+            counters.observed.tracked as usize,
+        ),
+        tracks_dropped: world.surveillance.map(|_| counters.event_count(EventKind::TrackDropped)),
         contacts_lost: counters.event_count(EventKind::Unheard),
         deadlines_missed: counters.event_count(EventKind::Deadline),
         groups_too_large: counters.event_count(EventKind::GroupTooLarge),
@@ -638,6 +655,12 @@ pub(crate) fn metrics(
         exempt_areas: area_exemptions(world, counters),
         beyond_bound: error_bound_violations(world, counters),
     }
+}
+
+/// Returns the fraction of observations with a track; none where nothing was observed by reports.
+fn track_availability(world: &AirspaceWorld, observed: ObservationCounts) -> Option<f64> {
+    let ObservationCounts { observations, tracked, .. } = observed;
+    (world.surveillance.is_some() && observations > 0).then(|| tracked as f64 / observations as f64)
 }
 
 fn has_endurance(world: &AirspaceWorld) -> bool {

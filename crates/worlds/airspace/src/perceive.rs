@@ -104,19 +104,11 @@ pub(super) fn surveillance_report(
     }
 }
 
-/// Returns the non-cooperative airplanes of a group, by id.
-pub(super) fn non_cooperative_aircraft(
+/// Returns a non-cooperative airplane as all see it where they see it in every cycle, at once.
+pub(super) fn non_cooperative_at(
     context: &PhaseContext<'_>,
-    group: &[EntitySlot],
-) -> Vec<NonCooperativeAircraft> {
-    group
-        .iter()
-        .filter(|slot| context.world.is_non_cooperative(**slot, context.now))
-        .map(|&slot| non_cooperative_at(context, slot))
-        .collect()
-}
-
-fn non_cooperative_at(context: &PhaseContext<'_>, slot: EntitySlot) -> NonCooperativeAircraft {
+    slot: EntitySlot,
+) -> NonCooperativeAircraft {
     let PhaseContext { world, state, now, .. } = *context;
     let airplane = &world.airplanes[slot as usize];
     let current = &state.airplanes[slot as usize];

@@ -22,6 +22,12 @@ pub(crate) const BURST_LOSS: Purpose = Purpose(7);
 pub(crate) const METHOD: Purpose = Purpose(8);
 /// Gusts.
 pub(crate) const GUST: Purpose = Purpose(9);
+/// Errors of reported velocities.
+pub(crate) const VELOCITY: Purpose = Purpose(10);
+/// Reports that observers receive, and the errors of their sensors.
+pub(crate) const REPORT: Purpose = Purpose(11);
+/// Times at which airplanes report.
+pub(crate) const REPORT_OFFSET: Purpose = Purpose(12);
 
 /// Returns the streams and purposes from which a network's faults are drawn.
 pub(crate) fn network_fault_streams(streams: Streams) -> FaultStreams {

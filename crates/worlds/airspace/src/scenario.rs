@@ -1,5 +1,6 @@
 //! The text of an airspace scenario, and its compiled form.
 
+mod accuracy;
 mod airplanes;
 mod areas;
 mod compile;
@@ -53,6 +54,7 @@ use sidestep_scenario::{
     schema,
 };
 use std::sync::Arc;
+use surveillance::SurveillanceSection;
 use types::TypeTable;
 use winds::{WindLayerSection, WindTable, load_wind_file};
 
@@ -161,6 +163,8 @@ struct AirspaceSection {
     position_noise_m: Option<Number<Closed<0, 1_000_000>>>,
     heading_noise_deg: Option<Number<HeadingNoise>>,
     error_sigmas: Option<Number<Closed<0, 100>>>,
+    /// How airplanes receive each other's reports; without it all see all others at once.
+    surveillance: Option<Spanned<SurveillanceSection>>,
     measures: MeasuresSection,
     well_clear: Option<WellClearSection>,
     nmac: Option<NmacSection>,
@@ -334,6 +338,7 @@ impl CompiledAirspace {
             controls: None,
             efforts: Vec::new(),
             holds: Vec::new(),
+            state_vectors: Vec::new(),
         }
     }
 }

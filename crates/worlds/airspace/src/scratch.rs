@@ -7,6 +7,7 @@ use crate::flight::FlightPhase;
 use crate::flown_leg::FlownLeg;
 use crate::metrics::AreaRecord;
 use crate::state::PairRecord;
+use crate::surveillance::ObservationCounts;
 use crate::trace::InspectionTrace;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{Cycle, EntitySlot};
@@ -31,6 +32,8 @@ pub struct Scratch {
     pub(crate) flown: Vec<FlownLeg>,
     /// Pairs that were named, for which the shield promises nothing: cycle and both airplanes.
     pub(crate) too_close: Vec<(Cycle, EntitySlot, EntitySlot)>,
+    /// Observations by surveillance.
+    pub(crate) observed: ObservationCounts,
     /// Times of airplanes in areas, by airplane and number of the area.
     pub(crate) areas: BTreeMap<(EntitySlot, u32), AreaRecord>,
     /// Airplanes that the shield does not keep clear of an area: cycle, airplane, and number of the area.

@@ -2,6 +2,7 @@
 
 mod abilities;
 mod changes;
+mod surveillance;
 mod values;
 
 pub(crate) use abilities::{
@@ -12,10 +13,11 @@ pub use changes::Combinations;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, OptimizerConfig, UpdateOrder, Utility};
+pub use surveillance::SurveillanceSettings;
 pub(crate) use values::{
     Bank, ChangeWeight, Cooling, Decision, Fading, Gibibytes, HeadingNoise, Held, Inflation,
     LevelGap, LookAhead, RoundCount, SeparationM, Speed, Step, SurveillanceCategory, Tolerance,
-    TurnCount, TurnRate, Weight,
+    TurnCount, TurnRate, VelocityCategory, Weight,
 };
 
 /// The methods by which airplanes choose their actions.

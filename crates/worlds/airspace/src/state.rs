@@ -5,6 +5,7 @@ mod end;
 mod hold;
 mod neighborhood;
 mod snapshot;
+mod state_vectors;
 
 use super::agents::traffic_state::TrafficPicture;
 use super::baseline::mvp::ActiveResolutions;
@@ -14,6 +15,7 @@ use super::measures::FlightEffort;
 use super::method::MethodKind;
 use super::pilot::{AirplaneControl, PilotMemory};
 use super::shield::{ExemptIds, Fallback};
+use super::surveillance::StateVectorHistory;
 use super::world::AirspaceWorld;
 pub use command::AirplaneCommand;
 pub use end::{FlightEnd, PackedFlightEnd};
@@ -54,6 +56,8 @@ pub struct AirspaceState {
     commands: Box<[Mutex<AirplaneCommand>]>,
     /// The action that a caller has ordered for each airplane; empty unless callers decide.
     external_actions: Box<[Mutex<Option<ExternalAction>>]>,
+    /// The past states of each airplane; empty where all see all.
+    state_vectors: Box<[Mutex<StateVectorHistory>]>,
     /// The cycle for which controls were submitted, or [`NEVER`].
     controls_cycle: AtomicCell<u64>,
     /// The controls of that cycle, until their groups take them out.
@@ -233,6 +237,7 @@ impl AirspaceState {
         let with_efforts = if world.measures.flights.is_some() { n } else { 0 };
         let with_commands = if world.has_commands() { n } else { 0 };
         let with_holds = if world.has_holds() { n } else { 0 };
+        let with_state_vectors = if world.surveillance.is_some() { n } else { 0 };
         let controls_cycle = AtomicCell::default();
         controls_cycle.set(NEVER);
         let state = Self {
@@ -259,6 +264,7 @@ impl AirspaceState {
                 .collect(),
             commands: restore_memories(with_commands, &snapshot.commands),
             external_actions: restore_memories(with_external_actions, &snapshot.external_actions),
+            state_vectors: restore_memories(with_state_vectors, &snapshot.state_vectors),
             controls_cycle,
             controls: Mutex::default(),
         };
@@ -437,6 +443,7 @@ impl AirspaceState {
             controls,
             efforts: self.efforts.iter().map(|one| *lock(one)).collect(),
             holds: self.holds.iter().map(AtomicCell::get).collect(),
+            state_vectors: self.state_vectors.iter().map(|one| lock(one).clone()).collect(),
         }
     }
 

@@ -219,6 +219,7 @@ pub(super) fn outcome(metrics: &Metrics) -> KeyValues {
     lines.extend(area_entries_text(metrics));
     lines.extend(not_appeared_warning(metrics));
     lines.extend(network(metrics));
+    lines.extend(surveillance_text(metrics));
     lines.extend(orders_and_tracks_text(metrics));
     lines.extend(unprotected_pairs_warning(&metrics.too_close));
     lines.extend(exempt_areas_warning(&metrics.exempt_areas));
@@ -297,6 +298,20 @@ fn network(m: &Metrics) -> KeyValues {
         lines.push(key_value_pair("trouble", faults.join(", ")));
     }
     lines
+}
+
+/// Returns the line on tracks; none where all see all.
+fn surveillance_text(m: &Metrics) -> Option<(String, String)> {
+    let share_percent = round_to_tenth(100.0 * m.track_availability?);
+    let mut words = format!("a track in {share_percent} % of the observations");
+    if let Some(age_s) = m.mean_track_age_s {
+        words += &format!(", {age_s:.2} s old");
+    }
+    let drops = m.tracks_dropped.unwrap_or(0);
+    if drops > 0 {
+        words += &format!(", dropped {} times", group_thousands(drops));
+    }
+    Some(key_value_pair("surveillance", words))
 }
 
 /// Returns the warning that a run was too short for some airplanes to be seen at all: they count among those

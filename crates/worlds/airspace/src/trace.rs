@@ -9,6 +9,7 @@ use crate::flight::{Action, KnownAircraft};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OwnshipState};
 use crate::shield::{Fallback, SafeManeuver, ShieldDecision, ShieldedAircraft, TurnProfile};
+use crate::surveillance::SurveillanceTrack;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 
@@ -23,6 +24,8 @@ pub(crate) struct InspectionTrace {
     pub(crate) non_cooperative: Vec<NonCooperativeAircraft>,
     /// Its knowledge of others before.
     pub(crate) contacts: TrafficPicture,
+    /// Its own tracks of others; none where all see all.
+    pub(crate) tracks: Option<Vec<SurveillanceTrack>>,
     /// The actions that the optimizer has chosen for all of the group, if they are known.
     pub(crate) joint: Option<Vec<usize>>,
     /// The optimizer's decision for it.

@@ -264,6 +264,10 @@ pub(super) fn to_log_event(event: &Event) -> LogEvent {
             Severity::Error,
             format!("is in the air for longer than its endurance of {value:.0} s"),
         ),
+        EventKind::TrackDropped => (
+            Severity::Warning,
+            format!("drops its track of airplane/{other}: its last report is {value:.1} s old"),
+        ),
         EventKind::SearchLimit => (
             Severity::Warning,
             format!(

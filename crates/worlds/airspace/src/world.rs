@@ -19,7 +19,9 @@ use super::measures::{FlightEffort, MeasureSettings};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
 use super::objective::{ActionChanges, ActionPredictions, Objective};
-use super::settings::{Deployment, Disturbance, Grouping, ReactiveSettings, RightOfWayRule};
+use super::settings::{
+    Deployment, Disturbance, Grouping, ReactiveSettings, RightOfWayRule, SurveillanceSettings,
+};
 use super::shield::{
     AirDrift, ErrorBounds, Fallback, OrbitSide, common_orbit_rates, curvature_error_m,
 };
@@ -118,6 +120,10 @@ pub struct AirspaceWorld {
     pub(crate) position_bound_m: Arc<[f64]>,
     /// Bounds on those errors for which the shield allows.
     pub bounds: ErrorBounds,
+    /// How airplanes receive each other's reports; none where all see all others at once.
+    pub surveillance: Option<SurveillanceSettings>,
+    /// Standard deviation of each coordinate of the velocity that an airplane reports, by id, in meters per second.
+    pub(crate) velocity_noise_m_s: Arc<[f64]>,
     /// The measures that a run takes.
     pub measures: MeasureSettings,
     /// Digest of the scenario's text and seed, by which agents recognize those of the same scenario.
@@ -315,6 +321,11 @@ impl AirspaceWorld {
     /// Returns the bound on the errors of that position for which the shield allows, in meters.
     pub fn position_bound_m(&self, i: usize) -> f64 {
         self.position_bound_m[i]
+    }
+
+    /// Returns the standard deviation of each coordinate of the velocity that an airplane reports, in meters per second.
+    pub fn velocity_noise_m_s(&self, i: usize) -> f64 {
+        self.velocity_noise_m_s[i]
     }
 
     /// Returns how far an airplane may be from its plans as they are seen, in meters.

@@ -128,6 +128,7 @@ impl World for AirspaceWorld {
         for (now, slot, number) in std::mem::take(&mut scratch.exempt_areas) {
             counters.add_exempt_area(now, (slot, number));
         }
+        counters.observed.add(std::mem::take(&mut scratch.observed));
         collector.decide_ns += std::mem::take(&mut scratch.decide_ns);
         collector.pending.events.append(&mut scratch.events);
         collector.pending.optimizations.append(&mut scratch.optimizations);

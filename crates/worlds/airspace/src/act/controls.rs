@@ -10,6 +10,7 @@ use crate::non_cooperative::NonCooperativeAircraft;
 use crate::pilot::{AirplaneControl, Maneuver, OptimizationStatus, OwnshipState};
 use crate::scratch::PhaseContext;
 use crate::shield::{Fallback, TurnProfile};
+use crate::surveillance::PerceivedTraffic;
 use sidestep_kernel::EntityId;
 
 /// What an airplane flies for one `dt`.
@@ -25,11 +26,11 @@ pub(super) struct FlownProfile {
 pub(super) fn apply_controls(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
-    non_cooperative: &[NonCooperativeAircraft],
+    traffic: &PerceivedTraffic,
     mut controls: Vec<Option<AirplaneControl>>,
 ) -> Vec<FlownProfile> {
     let PhaseContext { world, state, .. } = *context;
-    record_outcomes(context, own, non_cooperative, &controls);
+    record_outcomes(context, own, &traffic.non_cooperative, &controls);
     if world.shield && world.network.is_none() && controls.iter().any(Option::is_none) {
         // Plans that are sure are safe only if all fly them, and orbits always are.
         for control in controls.iter_mut().flatten() {
@@ -40,6 +41,8 @@ pub(super) fn apply_controls(
         }
     }
     state.drop_external_actions(&own.iter().map(|own| own.id).collect::<Vec<_>>());
+    let near: Vec<&NonCooperativeAircraft> =
+        traffic.non_cooperative.iter().chain(&traffic.unseen).collect();
     let mut profiles = Vec::with_capacity(own.len());
     for (own, control) in own.iter().zip(controls) {
         let maneuver = match control {
@@ -60,7 +63,7 @@ pub(super) fn apply_controls(
             }
         };
         if world.shield {
-            exempt_non_cooperative(context, own, non_cooperative, &flown.profile);
+            exempt_non_cooperative(context, own, &near, &flown.profile);
         }
         profiles.push(flown);
     }

@@ -2,7 +2,10 @@
 
 use crate::avoid::group_threats;
 use crate::baseline::ReactiveMemory;
-use crate::decide::{DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_for_group};
+use crate::decide::{
+    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_beside_others,
+    candidates_for_group, non_cooperative_state,
+};
 use crate::events::{Event, EventKind, search_limit};
 use crate::flight::KnownAircraft;
 use crate::non_cooperative::NonCooperativeAircraft;
@@ -12,21 +15,21 @@ use crate::shield::{
     PlanCertainty, PlanEnding, PlanRules, ShieldedAircraft, Surroundings, TurnProfile,
     filter_maneuvers_beside,
 };
-use crate::world::AirspaceWorld;
-use sidestep_kernel::{Cycle, EntitySlot};
+use crate::surveillance::{GroupObservations, PerceivedTraffic, each_decides_by_tracks};
+use sidestep_kernel::EntitySlot;
 
 /// Decides for the airplanes of a group. Returns the control of each, and what it has considered.
 pub(super) fn decide(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
-    non_cooperative: &[NonCooperativeAircraft],
+    traffic: &PerceivedTraffic,
 ) -> Vec<(AirplaneControl, ManeuverCandidates)> {
     let PhaseContext { world, clock, .. } = *context;
     let start_ns = clock.thread_cpu_ns();
-    let mut all = find_candidates(context, own, non_cooperative);
+    let mut all = find_candidates(context, own, traffic);
     context.scratch.decide_ns += clock.thread_cpu_ns() - start_ns;
     let maneuvers: Vec<Maneuver> = if world.shield {
-        shielded_maneuvers(context, own, non_cooperative, &mut all)
+        shielded_maneuvers(context, own, &traffic.non_cooperative, &mut all)
     } else {
         own.iter().zip(&all).map(|(own, (_, one))| unshielded_maneuver(own, one)).collect()
     };
@@ -44,9 +47,10 @@ pub(super) fn decide(
 fn find_candidates(
     context: &mut PhaseContext<'_>,
     own: &[OwnshipState],
-    non_cooperative: &[NonCooperativeAircraft],
+    traffic: &PerceivedTraffic,
 ) -> Vec<(AirplaneControl, ManeuverCandidates)> {
     let PhaseContext { world, state, now, .. } = *context;
+    let non_cooperative = &traffic.non_cooperative[..];
     let slots: Vec<EntitySlot> = own.iter().map(|own| own.id).collect();
     let group: Vec<KnownAircraft> = own.iter().map(OwnshipState::as_known_aircraft).collect();
     let mut memories = state.take_memories(&slots);
@@ -59,7 +63,17 @@ fn find_candidates(
             })
             .collect(),
         DecisionStrategy::Reactive | DecisionStrategy::Joint => {
-            decide_together(world, &group, non_cooperative, &mut memories, now)
+            let mut kept = take_reactive_memories(&mut memories);
+            let candidates = match &traffic.observations {
+                Some(observations) if each_decides_by_tracks(world) => {
+                    candidates_by_tracks(context, &group, observations, &mut kept)
+                }
+                _ => candidates_for_group(world, &group, non_cooperative, &mut kept, now),
+            };
+            for (memory, kept) in memories.iter_mut().zip(kept) {
+                memory.resolving = kept.resolving;
+            }
+            candidates
         }
     };
     let mut controls: Vec<AirplaneControl> = slots
@@ -81,24 +95,43 @@ fn find_candidates(
     controls.into_iter().zip(considered).collect()
 }
 
-/// Returns the candidates of the airplanes of a group by a method that considers all of them.
-fn decide_together(
-    world: &AirspaceWorld,
-    group: &[KnownAircraft],
-    non_cooperative: &[NonCooperativeAircraft],
-    memories: &mut [PilotMemory],
-    now: Cycle,
-) -> Vec<ManeuverCandidates> {
+/// Takes out what a method keeps of the airplanes of a group.
+fn take_reactive_memories(memories: &mut [PilotMemory]) -> Vec<ReactiveMemory> {
     let mut kept: Vec<ReactiveMemory> = Vec::with_capacity(memories.len());
-    for memory in memories.iter_mut() {
+    for memory in memories {
         let resolving = std::mem::take(&mut memory.resolving);
         kept.push(ReactiveMemory { resolving, command: memory.command });
     }
-    let candidates = candidates_for_group(world, group, non_cooperative, &mut kept, now);
-    for (memory, kept) in memories.iter_mut().zip(kept) {
-        memory.resolving = kept.resolving;
+    kept
+}
+
+/// Returns the candidates of airplanes each of which decides by itself, from its own tracks.
+fn candidates_by_tracks(
+    context: &PhaseContext<'_>,
+    group: &[KnownAircraft],
+    observations: &GroupObservations,
+    kept: &mut [ReactiveMemory],
+) -> Vec<ManeuverCandidates> {
+    let PhaseContext { world, now, .. } = *context;
+    let mut all = Vec::with_capacity(group.len());
+    for (known, memory) in group.iter().zip(kept) {
+        let tracks = observations.tracks_of(known.slot);
+        let others_at = |seconds: f64| {
+            let states = tracks.iter().map(|track| {
+                if world.is_non_cooperative(track.slot, now) {
+                    let seen = track.non_cooperative_aircraft(world);
+                    non_cooperative_state(world, &seen, seconds)
+                } else {
+                    track.aircraft_state(world, seconds)
+                }
+            });
+            states.collect()
+        };
+        let own = std::slice::from_ref(known);
+        let memory = std::slice::from_mut(memory);
+        all.extend(candidates_beside_others(world, own, &others_at, memory, now));
     }
-    candidates
+    all
 }
 
 /// Returns the maneuver of an airplane that flies its first candidate.

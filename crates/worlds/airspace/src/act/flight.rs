@@ -8,6 +8,7 @@ use crate::measures::FlightEffort;
 use crate::scratch::PhaseContext;
 use crate::shield::{Fallback, TurnProfile};
 use crate::state::FlightEnd;
+use crate::surveillance::StateVector;
 use sidestep_kernel::{Cycle, EntitySlot};
 use std::borrow::Cow;
 
@@ -45,6 +46,8 @@ pub(super) struct AircraftCycleMotion<'a> {
     pub(super) legs: Vec<ConstantRateLeg>,
     /// Legs flown in this `dt` in the frame, with times after the start of the run.
     pub(super) flown: Vec<ConstantRateLeg>,
+    /// Its states at the start of the steps of this `dt`; none where all see all.
+    pub(super) states: Vec<StateVector>,
     /// What its flight has cost; none where that is not measured, or it flies a recorded track.
     pub(super) effort: Option<FlightEffort>,
     /// Set as soon as its flight has ended: from then on it neither flies nor meets others.
@@ -108,6 +111,7 @@ impl<'a> AircraftCycleMotion<'a> {
             next,
             legs: Vec::new(),
             flown: Vec::new(),
+            states: Vec::new(),
             effort,
             end: None,
         }
@@ -143,6 +147,12 @@ impl<'a> AircraftCycleMotion<'a> {
             }
         }
         self.record_legs(moment.step_s);
+    }
+
+    /// Records its state at the start of a step, as its reports tell it.
+    pub(super) fn record_state(&mut self, step: u64) {
+        let leg = self.legs.first();
+        self.states.extend(leg.map(|leg| StateVector::from_leg(step, self.frame, leg)));
     }
 
     /// Adds the legs of a step to those flown in this `dt`.

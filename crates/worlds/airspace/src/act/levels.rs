@@ -11,10 +11,11 @@ use crate::avoid::NonCooperativeAvoidance;
 use crate::events::{Event, EventKind};
 use crate::flight::FlightLevelRange;
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::perceive::{non_cooperative_aircraft, ownship_state};
+use crate::perceive::ownship_state;
 use crate::pilot::OwnshipState;
 use crate::scratch::PhaseContext;
 use crate::shield::{Fallback, ShieldedAircraft, altitude_short_of, next_altitude};
+use crate::surveillance::PerceivedTraffic;
 use sidestep_kernel::EntitySlot;
 
 /// Lets the airplanes of a group keep their levels, until they are cleared for others.
@@ -46,7 +47,7 @@ pub(super) fn clear_levels(
     if !world.shield || changing.is_empty() {
         return;
     }
-    let non_cooperative = non_cooperative_aircraft(context, group);
+    let non_cooperative = PerceivedTraffic::non_cooperative_aircraft(context, group);
     let mut all: Vec<ShieldedAircraft> =
         flown.iter().map(|&slot| shielded_aircraft(context, slot)).collect();
     // One after the other, each with regard to the levels that those before it pass: by falling rank, as everywhere.

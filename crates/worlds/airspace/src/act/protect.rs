@@ -21,7 +21,7 @@ pub(super) fn shielded_aircraft(context: &PhaseContext<'_>, slot: EntitySlot) ->
 pub(super) fn exempt_non_cooperative(
     context: &mut PhaseContext<'_>,
     own: &OwnshipState,
-    all: &[NonCooperativeAircraft],
+    all: &[&NonCooperativeAircraft],
     profile: &TurnProfile,
 ) {
     let slot = own.id;
@@ -31,7 +31,8 @@ pub(super) fn exempt_non_cooperative(
     }
     let &mut PhaseContext { world, state, now, ref mut scratch, .. } = context;
     let aircraft = own.shielded_aircraft(world, now);
-    let avoidance = NonCooperativeAvoidance::new(&aircraft, all, world.timing.dtau_s);
+    let avoidance =
+        NonCooperativeAvoidance::new(&aircraft, all.iter().copied(), world.timing.dtau_s);
     let threats: Vec<&NonCooperativeAircraft> = avoidance.threats(profile).collect();
     let is_threat = |other: EntitySlot| threats.iter().any(|one| one.slot == other);
     state.retain_exempt(slot, |other| !world.is_non_cooperative(other, now) || is_threat(other));

@@ -35,6 +35,9 @@ pub(super) fn fly_sub_steps(
         }
         for flight in flights.iter_mut().filter(|f| f.end.is_none()) {
             flight.find_step_legs(moment, world.timing.dtau_s);
+            if world.surveillance.is_some() {
+                flight.record_state(step);
+            }
         }
         // Distances are those during the step: the legs of all are known, and nobody has flown yet.
         approaches::record_distances(world, &flights, moment, context.scratch);
@@ -136,6 +139,7 @@ fn store_flight(context: &mut PhaseContext<'_>, flight: AircraftCycleMotion<'_>)
         FlightPathSource::Track(_) => 0.0,
     };
     state.set_turn_rate_rad_s(flight.slot, turn_rate_rad_s);
+    state.add_state_vectors(world, flight.slot, &flight.states);
     if let Some((mut effort, measures)) = flight.effort.zip(world.measures.flights) {
         flight.flown.iter().for_each(|leg| effort.add_leg(leg, measures));
         state.set_effort(flight.slot, effort);

@@ -10,6 +10,7 @@ use super::preferences::{rank_by_turn_difference, turn_profiles_from_actions};
 use crate::baseline::{AircraftState, ReactiveMemory, bands, mvp, orca};
 use crate::flight::{
     Frame, InterOrderSegment, KnownAircraft, LevelCommand, MethodCommand, Point, Pose2, Surface,
+    rotated,
 };
 use crate::flight_plan::CLIMB_M_S;
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
@@ -40,16 +41,19 @@ struct StepTraffic<'a> {
     /// Seconds since the cycle began.
     elapsed_s: f64,
     group: &'a [KnownAircraft],
-    /// Those that avoid nobody.
+    /// Those around it: of them some avoid nobody.
     others: &'a [AircraftState],
 }
 
+/// The airplanes that those of a group consider beside each other, some seconds after the start of the cycle.
+pub(super) type OthersAt<'a> = dyn Fn(f64) -> Vec<AircraftState> + 'a;
+
 /// Returns the turn profiles that each airplane of a group may fly in the next `dt`: the one that the method
-/// prefers, and then the others by how little they differ from it.
+/// prefers, and then the others by how little they differ from it. `others_at` gives all around the group.
 pub(super) fn profiles_by_velocity(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
-    non_cooperative: &[NonCooperativeAircraft],
+    others_at: &OthersAt<'_>,
     kept: &mut [ReactiveMemory],
     now: Cycle,
 ) -> Vec<Vec<TurnProfile>> {
@@ -62,10 +66,7 @@ pub(super) fn profiles_by_velocity(
     let dtau_s = world.timing.dtau_s;
     for k in 0..world.timing.points_per_dt() {
         let elapsed_s = k as f64 * world.timing.dtau_s;
-        let others: Vec<AircraftState> = non_cooperative
-            .iter()
-            .map(|one| non_cooperative_state(world, one, elapsed_s))
-            .collect();
+        let others = others_at(elapsed_s);
         let traffic = StepTraffic { now, elapsed_s, group: &ahead, others: &others };
         let steering = decide_steering(world, traffic, &mut memory);
         for (place, mut steering) in steering.into_iter().enumerate() {
@@ -428,7 +429,7 @@ fn point_ahead(pose: Pose2, heading_rad: f64) -> Point {
 }
 
 /// Returns a non-cooperative airplane after some seconds, with as much more separation as it flies in one `dt`.
-fn non_cooperative_state(
+pub(crate) fn non_cooperative_state(
     world: &AirspaceWorld,
     one: &NonCooperativeAircraft,
     seconds: f64,
@@ -455,15 +456,6 @@ fn non_cooperative_state(
         levels: one.levels,
         yields: false,
     }
-}
-
-/// Returns a vector turned by an angle; the same bits for none.
-fn rotated([x, y]: Point, rad: f64) -> Point {
-    if rad == 0.0 {
-        return [x, y];
-    }
-    let (sin, cos) = math::sin_cos(rad);
-    [cos * x - sin * y, sin * x + cos * y]
 }
 
 fn aircraft_state(world: &AirspaceWorld, known: KnownAircraft) -> AircraftState {

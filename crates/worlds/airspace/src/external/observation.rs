@@ -1,8 +1,10 @@
 //! Observations: the knowledge with which an airplane decides, as numbers of fixed shapes.
 
+use crate::baseline::AircraftState;
 use crate::flight::{InterOrderSegment, KnownAircraft, Point, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::scratch::PhaseContext;
+use crate::surveillance::{PerceivedTraffic, each_decides_by_tracks};
 use crate::world::AirspaceWorld;
 use sidestep_kernel::control::{BufferMut, ValueDomain, ValueSpace};
 use sidestep_kernel::math::{atan2, hypot, wrap_angle};
@@ -88,6 +90,34 @@ impl VisibleAircraft {
             }
         });
         cooperative.chain(others).collect()
+    }
+
+    /// Returns the airplanes that one has tracks of, as it sees them; `None` where all see all, or tell each other where
+    /// they are.
+    pub(super) fn from_tracks(
+        context: &PhaseContext<'_>,
+        observer: EntitySlot,
+        traffic: &PerceivedTraffic,
+    ) -> Option<Vec<Self>> {
+        let PhaseContext { world, now, .. } = *context;
+        let observations = traffic.observations.as_ref();
+        let observations = observations.filter(|_| each_decides_by_tracks(world))?;
+        let tracks = observations.tracks_of(observer).iter();
+        let visible = tracks.map(|track| {
+            let AircraftState {
+                at, heading_rad, velocity: [vx, vy], separation_m, altitude_m, ..
+            } = track.aircraft_state(world, 0.0);
+            Self {
+                slot: track.slot,
+                at,
+                altitude_m,
+                heading_rad: wrap_heading(heading_rad),
+                speed_m_s: hypot(vx, vy),
+                separation_m,
+                is_cooperative: !world.is_non_cooperative(track.slot, now),
+            }
+        });
+        Some(visible.collect())
     }
 }
 

@@ -16,6 +16,15 @@ pub fn distance_m(a: Point, b: Point) -> f64 {
     math::hypot(a[0] - b[0], a[1] - b[1])
 }
 
+/// Returns a vector turned by an angle; the same bits for none.
+pub(crate) fn rotated([x, y]: Point, rad: f64) -> Point {
+    if rad == 0.0 {
+        return [x, y];
+    }
+    let (sin, cos) = math::sin_cos(rad);
+    [cos * x - sin * y, sin * x + cos * y]
+}
+
 /// Abilities and separation of an airplane.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AircraftModel {

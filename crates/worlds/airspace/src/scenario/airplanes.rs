@@ -9,7 +9,8 @@ use crate::flight::{
 use crate::flight_plan::{AirplaneSection, mixed_positions};
 use crate::settings::{
     AbilityKeys, AltitudeLimit, Bank, ChangeList, Combinations, PositiveRate, PositiveTime,
-    SeparationM, Speed, SpeedLimit, SurveillanceCategory, TurnCount, TurnRate, ability_keys,
+    SeparationM, Speed, SpeedLimit, SurveillanceCategory, TurnCount, TurnRate, VelocityCategory,
+    ability_keys,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -66,6 +67,8 @@ pub(super) struct ModelSection {
     pub(super) nac_p: Option<SurveillanceCategory>,
     /// Category of integrity of reported positions, NIC of ADS-B: a radius for which the shield allows.
     pub(super) nic: Option<SurveillanceCategory>,
+    /// Category of accuracy of reported velocities, NACv of ADS-B, for airspace.surveillance.
+    pub(super) nac_v: Option<VelocityCategory>,
 }
 
 impl ModelSection {

@@ -98,7 +98,9 @@ impl<'a> Compiler<'a> {
         let first = first_fallbacks_of(&world);
         let fallbacks = Arc::new(first.fallbacks);
         world.first_fallbacks = Arc::clone(&fallbacks);
-        world.later_rules = Arc::new(self.later_rules(&world)?);
+        let mut later = self.later_rules(&world)?;
+        self.complete_surveillance(&mut world, &mut later)?;
+        world.later_rules = Arc::new(later);
         self.check_wind_field(&world)?;
         self.check_earth(&world)?;
         let head = &self.recipe.head;
@@ -127,6 +129,7 @@ impl<'a> Compiler<'a> {
             || world.has_position_errors
             || heading_rad > 0.0
             || world.gusts.is_some()
+            || world.surveillance.is_some()
             || world.network.is_some();
         if is_drawn {
             return SeedEffect::Decide;
@@ -179,6 +182,8 @@ impl<'a> Compiler<'a> {
             wind_m_s: wind.wind_m_s,
             wind_field: wind.field,
             gusts: self.gusts(&timing, &airplanes)?,
+            surveillance: self.surveillance(&timing)?,
+            velocity_noise_m_s: self.velocity_noises_m_s(airplanes.len()).into(),
             passing,
             airplanes: Arc::new(airplanes),
             timing,

@@ -6,6 +6,7 @@ use super::{AirspaceSection, CompiledAirspace, ModelSection};
 use crate::flight::{AirplaneStart, FlightTask, TurnLimit};
 use crate::method::MethodKind;
 use crate::settings::{Combinations, Resolution};
+use crate::surveillance::each_decides_by_tracks;
 use sidestep_scenario::Remark;
 
 /// Returns the remarks on a scenario, in the order of its keys.
@@ -73,6 +74,12 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
     if section.error_sigmas.is_some() && has_no_errors(compiled) {
         note("error_sigmas", "no position and no heading has errors for which it counts");
     }
+    if section.surveillance.is_some() && !is_anybody_observed(compiled) {
+        note(
+            "surveillance",
+            "airplanes tell each other where they are, and none is non-cooperative",
+        );
+    }
     if let Some(safe_m) = compiled.world.safe_altitude_m {
         if compiled.world.all_rules().all(|rules| !rules.shield) {
             note("safe_altitude_m", "without the shield no airplane is held");
@@ -105,6 +112,17 @@ fn has_no_vertical_resolution(compiled: &CompiledAirspace) -> bool {
             let is_vertical = rules.mvp_resolution.resolution == Resolution::Vertical;
             is_vertical && rules.right_of_way.is_horizontal()
         })
+}
+
+/// Returns whether any airplane is seen by reports under some of the rules.
+fn is_anybody_observed(compiled: &CompiledAirspace) -> bool {
+    let airplanes = compiled.world.airplanes.len();
+    compiled.world.all_rules().any(|rules| {
+        // One on a recorded track is non-cooperative for a while.
+        let is_tracked = |i: usize| rules.airplanes[i].track.is_some() && rules.replay_cycles > 0;
+        each_decides_by_tracks(rules)
+            || (0..airplanes).any(|i| !rules.is_controlled(i) || is_tracked(i))
+    })
 }
 
 /// Returns the lowest altitude in meters that an airplane has by its start and its orders.
@@ -173,6 +191,11 @@ fn effectless_limits(compiled: &CompiledAirspace) -> Vec<Remark> {
             world.changes.is_none() && airplanes.iter().any(|a| !a.changes.speeds_m_s.is_empty()),
             no_choice,
         ),
+        (
+            "nac_v",
+            world.surveillance.is_none() && world.velocity_noise_m_s.iter().any(|m_s| *m_s > 0.0),
+            "without [airspace.surveillance] nobody takes velocities from reports",
+        ),
         ("acceleration_m_s2", keys.acceleration_m_s2.is_some() && !changes_speed, no_speed),
         ("climb_max_m_s", keys.climb_max_m_s.is_some() && !changes_level, no_level),
         ("descent_max_m_s", keys.descent_max_m_s.is_some() && !changes_level, no_level),
@@ -239,7 +262,10 @@ fn looks_anew(compiled: &CompiledAirspace) -> bool {
 fn has_no_errors(compiled: &CompiledAirspace) -> bool {
     let section = &compiled.recipe.file.airspace;
     let is_zero = |noise: Option<f64>| noise.is_none_or(|noise| noise == 0.0);
-    is_zero(section.heading_noise_deg.map(f64::from)) && !compiled.world.has_position_errors
+    let surveillance = section.surveillance.as_ref();
+    is_zero(section.heading_noise_deg.map(f64::from))
+        && !compiled.world.has_position_errors
+        && !surveillance.is_some_and(|given| given.get_ref().has_position_noise())
 }
 
 #[cfg(test)]
@@ -391,6 +417,25 @@ mod tests {
         assert_eq!(remarks("safe_altitude_m = 100.0\n"), [""; 0], "all fly at 0 m");
         assert_eq!(remarks("safe_altitude_m = -5.0\n"), named);
         assert_eq!(remarks("safe_altitude_m = 100.0\nshield = \"off\"\n"), named);
+    }
+
+    #[test]
+    fn surveillance_by_which_nobody_is_seen_is_named() {
+        let keys = "surveillance = { latency_s = 1.0 }\n";
+        assert_eq!(remarks(keys), ["airspace.surveillance"]);
+        for method in ["mvp", "orca", "bands", "external"] {
+            assert_eq!(remarks(&format!("method = \"{method}\"\n{keys}")), [""; 0], "{method}");
+        }
+        let team = "method = \"mvp\"\ndeployment = \"team\"\n";
+        assert_eq!(remarks(&format!("{team}{keys}")), ["airspace.surveillance"]);
+        let later = "changes = [{ at_s = 50.0, airplanes = [1], non_cooperative = true }]\n";
+        assert_eq!(remarks(&format!("{later}{keys}")), [""; 0]);
+        let velocity = "method = \"mvp\"\n[airplane]\nnac_v = 2\n";
+        assert_eq!(remarks(velocity), ["airplane.nac_v"]);
+        assert_eq!(remarks(&format!("{keys}{velocity}")), [""; 0]);
+        let noise =
+            "method = \"mvp\"\nerror_sigmas = 3.0\nsurveillance = { position_noise_m = 9.0 }\n";
+        assert_eq!(remarks(noise), [""; 0]);
     }
 
     #[test]

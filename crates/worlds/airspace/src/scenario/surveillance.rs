@@ -1,174 +1,223 @@
-//! How accurate the positions are that airplanes report, and how far they may be off: one by one, by the categories of ADS-B.
-//!
-//! NACp, the navigation accuracy category for position, states a bound on the estimated position uncertainty: a radius
-//! within which a reported position is with a probability of 95 %. NIC, the navigation integrity category, states a
-//! containment radius, beyond which it is not believed to be. Both are those of RTCA DO-260B (EUROCAE ED-102A), NIC
-//! without its supplements. 14 CFR 91.227 asks for NACp 8 and NIC 7 at least.
-//!
-//! Here errors are normal, with the standard deviation in each coordinate by which 95 % of positions are within the
-//! radius of NACp; and the shield allows for errors up to the radius of NIC. Larger ones are reported.
+//! The section of surveillance, and what cannot be flown by it.
 
 use super::compile::Compiler;
-use crate::flight_plan::AirplaneSection;
-use crate::settings::SurveillanceCategory;
-use sidestep_scenario::Spanned;
+use crate::flight::{Point, TimeDiscretization};
+use crate::settings::SurveillanceSettings;
+use crate::world::AirspaceWorld;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use sidestep_kernel::InputError;
+use sidestep_kernel::distr::Bernoulli;
+use sidestep_kernel::geometry::{norm, sub};
+use sidestep_kernel::{Cycle, EntitySlot};
+use sidestep_scenario::{AboveZero, Closed, LeftOpen, Number};
 
-/// A nautical mile in meters.
-const NM_M: f64 = 1852.0;
-/// The estimated position uncertainty of each NACp from 1 on, in meters.
-const UNCERTAINTIES_M: [f64; 11] = [
-    10.0 * NM_M,
-    4.0 * NM_M,
-    2.0 * NM_M,
-    NM_M,
-    0.5 * NM_M,
-    0.3 * NM_M,
-    0.1 * NM_M,
-    0.05 * NM_M,
-    30.0,
-    10.0,
-    3.0,
-];
-/// The radius of containment of each NIC from 1 on, in meters.
-const CONTAINMENT_M: [f64; 11] = [
-    20.0 * NM_M,
-    8.0 * NM_M,
-    4.0 * NM_M,
-    2.0 * NM_M,
-    NM_M,
-    0.6 * NM_M,
-    0.2 * NM_M,
-    0.1 * NM_M,
-    75.0,
-    25.0,
-    7.5,
-];
-/// Standard deviations of a coordinate in the radius within which 95 % of positions are, of two normal coordinates: the
-/// root of -2 ln 0.05.
-const DEVIATIONS_OF_95_PERCENT: f64 = 2.447_746_830_680_816;
+/// Seconds after which a track is dropped, unless the scenario gives a number.
+const DEFAULT_COAST_S: f64 = 10.0;
+/// Reports that a track may miss in a row before it is dropped, unless the scenario says otherwise.
+const DEFAULT_MISSED_REPORTS: f64 = 3.0;
+/// Largest number of past states that are kept of each airplane: the memory of a run grows with it.
+const MAX_KEPT_STATES: usize = 10_000;
+/// Fraction of a step by which a time may miss a whole number of steps because decimal fractions are rounded.
+const ROUNDING: f64 = 1e-9;
 
-/// The errors of reported positions, by airplane.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct PositionErrors {
-    /// Standard deviation of each coordinate, in meters.
-    pub(super) noise_m: Vec<f64>,
-    /// Bound for which the shield allows, in meters.
-    pub(super) bound_m: Vec<f64>,
+/// How airplanes see those that do not tell them where they are: by reports that each of them receives or misses.
+///
+/// Airplanes of method pc and all agents tell the others of their group their states, and the shield is a link of its own:
+/// surveillance changes what these know of non-cooperative airplanes alone.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct SurveillanceSection {
+    /// Time between two reports of an airplane, a multiple of dtau_s, which is the default.
+    report_interval_s: Option<Number<LeftOpen<0, 3600>>>,
+    /// Time from the measurement of a report to its use, rounded up to steps of dtau_s; trackers move the airplane on by it.
+    latency_s: Option<Number<Closed<0, 3600>>>,
+    /// Chance that an airplane receives a report of another one.
+    reception_probability: Option<Number<LeftOpen<0, 1>>>,
+    /// Distance beyond which none is received.
+    range_m: Option<Number<AboveZero>>,
+    /// Age of its last report above which a track is dropped.
+    coast_s: Option<Number<LeftOpen<0, 3600>>>,
+    /// Standard deviation of the error of each observer's sensor in each coordinate of a position, beside the error of the
+    /// report.
+    position_noise_m: Option<Number<Closed<0, 1_000_000>>>,
+    /// The same for each coordinate of the velocity over the ground.
+    velocity_noise_m_s: Option<Number<Closed<0, 1000>>>,
 }
 
-/// The errors of the reported positions of one airplane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PositionError {
-    pub(super) noise_m: f64,
-    pub(super) bound_m: f64,
+impl SurveillanceSection {
+    /// Returns whether a key is given that has an effect on errors alone.
+    pub(super) fn has_position_noise(&self) -> bool {
+        self.position_noise_m.is_some_and(|noise_m| noise_m.get() > 0.0)
+    }
 }
 
 impl Compiler<'_> {
-    /// Returns the errors of all airplanes, of which the last ones are those of the file.
-    pub(super) fn position_errors(&self, airplanes: usize) -> PositionErrors {
-        let sections = &self.file.airplanes.0;
-        let generated = airplanes.saturating_sub(sections.len());
-        let common = std::iter::repeat_n(None, generated);
-        let mut errors = PositionErrors::default();
-        for own in common.chain(sections.iter().map(Some)) {
-            let PositionError { noise_m, bound_m } = self.position_error(own);
-            errors.noise_m.push(noise_m);
-            errors.bound_m.push(bound_m);
+    /// Returns how airplanes receive each other's reports, if the scenario says so.
+    ///
+    /// # Errors
+    /// When times do not fit each other, or nobody could agree on what is seen.
+    pub(super) fn surveillance(
+        &self,
+        timing: &TimeDiscretization,
+    ) -> Result<Option<SurveillanceSettings>, InputError> {
+        let Some(given) = &self.file.airspace.surveillance else { return Ok(None) };
+        let section = given.get_ref();
+        let error = |cause: &str, remedy: &str| Err(self.source.error(given.span(), cause, remedy));
+        if self.file.airspace.network.is_some() {
+            let cause = "surveillance by each airplane, over an unreliable network: those that do not hear each other \
+                         have to see the same";
+            return error(cause, "leave out [airspace.surveillance] or [airspace.network]");
         }
-        errors
+        let dtau_s = timing.dtau_s;
+        let interval_s = section.report_interval_s.map_or(dtau_s, f64::from);
+        let interval = interval_s / dtau_s;
+        if (interval - interval.round()).abs() > ROUNDING * interval || interval < 0.5 {
+            let step =
+                if self.file.airspace.look_every_s.is_some() { "look_every_s" } else { "dtau_s" };
+            let cause =
+                format!("report_interval_s = {interval_s} is no multiple of {step} = {dtau_s}");
+            let remedy = format!("give {dtau_s} or a multiple of it, or a smaller {step}");
+            return error(&cause, &remedy);
+        }
+        let latency_s = section.latency_s.map_or(0.0, f64::from);
+        let latency_steps = (latency_s / dtau_s - ROUNDING).ceil().max(0.0);
+        // The oldest report of a track that misses none.
+        let usual_s = latency_steps * dtau_s + interval_s;
+        let missed_s = latency_steps * dtau_s + DEFAULT_MISSED_REPORTS * interval_s;
+        let coast_s = section.coast_s.map_or(DEFAULT_COAST_S.max(missed_s), f64::from);
+        let coast_steps = (coast_s / dtau_s + ROUNDING).floor();
+        if coast_s < usual_s - ROUNDING {
+            let cause = format!(
+                "coast_s = {coast_s}, and reports are up to {usual_s} s old: of latency_s in steps of {dtau_s} s, and \
+                 report_interval_s"
+            );
+            return error(&cause, &format!("give a coast_s of {usual_s} or more"));
+        }
+        let position_noise_m = section.position_noise_m.map_or(0.0, f64::from);
+        let settings = SurveillanceSettings {
+            interval_steps: interval.round() as u64,
+            latency_steps: latency_steps as u64,
+            coast_steps: coast_steps as u64,
+            reception: Bernoulli::new(section.reception_probability.map_or(1.0, f64::from)),
+            range_m: section.range_m.map_or(f64::INFINITY, f64::from),
+            position_noise_m,
+            velocity_noise_m_s: section.velocity_noise_m_s.map_or(0.0, f64::from),
+            position_bound_m: self.error_sigmas() * position_noise_m,
+            max_wind_change_m_s: 0.0,
+        };
+        let kept = settings.kept_states(timing.points_per_dt());
+        if kept > MAX_KEPT_STATES {
+            let cause = format!(
+                "a coast_s of {coast_s} s, in steps of {dtau_s} s: {kept} states of each airplane"
+            );
+            return error(&cause, &format!("give up to {MAX_KEPT_STATES} steps"));
+        }
+        Ok(Some(settings))
     }
 
-    /// Returns the errors of an airplane of the file, or of the generated ones: by its own categories, then those of all,
-    /// and then the scenario's standard deviation.
-    pub(super) fn position_error(&self, own: Option<&Spanned<AirplaneSection>>) -> PositionError {
-        let own = own.map(Spanned::get_ref);
-        let common = self.file.airplane.as_ref();
-        let nac_p = own.and_then(|own| own.nac_p).or(common.and_then(|common| common.nac_p));
-        let nic = own.and_then(|own| own.nic).or(common.and_then(|common| common.nic));
-        let radius_m = |radii_m: &[f64; 11], category: SurveillanceCategory| {
-            let place = category.get() as usize - 1;
-            radii_m[place]
+    /// Completes the settings of surveillance by the rules that hold later, and refuses gusts in which the shield could not
+    /// bound where a non-cooperative airplane is.
+    pub(super) fn complete_surveillance(
+        &self,
+        world: &mut AirspaceWorld,
+        later: &mut [(Cycle, AirspaceWorld)],
+    ) -> Result<(), InputError> {
+        let Some(given) = &self.file.airspace.surveillance else { return Ok(()) };
+        let rules = || std::iter::once(&*world).chain(later.iter().map(|(_, world)| world));
+        let is_never_cooperative = |world: &AirspaceWorld| {
+            (0..world.airplanes.len())
+                .any(|i| world.is_non_cooperative(i as EntitySlot, Cycle::MAX - 1))
         };
-        let noise_m = match nac_p {
-            Some(nac_p) => radius_m(&UNCERTAINTIES_M, nac_p) / DEVIATIONS_OF_95_PERCENT,
-            None => self.position_noise_m(),
-        };
-        let bound_m = match nic {
-            Some(nic) => radius_m(&CONTAINMENT_M, nic),
-            None => self.error_sigmas() * noise_m,
-        };
-        PositionError { noise_m, bound_m }
+        if world.gusts.is_some() && rules().any(|rules| rules.shield && is_never_cooperative(rules))
+        {
+            let cause = "gusts under the shield, beside non-cooperative airplanes that are seen late: nobody knows how far a gust \
+                         has carried them since";
+            let remedy = "leave out gusts, [airspace.surveillance] or the non-cooperative airplanes, or set \
+                          airspace.shield = \"off\"";
+            return Err(self.source.error(given.span(), cause, remedy));
+        }
+        let winds_m_s: Vec<Point> = rules().map(|rules| rules.wind_m_s).collect();
+        let mut max_change_m_s: f64 = 0.0;
+        for (k, &wind_m_s) in winds_m_s.iter().enumerate() {
+            for &other_m_s in &winds_m_s[..k] {
+                max_change_m_s = max_change_m_s.max(norm(sub(wind_m_s, other_m_s)));
+            }
+        }
+        let all = std::iter::once(world).chain(later.iter_mut().map(|(_, world)| world));
+        for settings in all.filter_map(|world| world.surveillance.as_mut()) {
+            settings.max_wind_change_m_s = max_change_m_s;
+        }
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::shield::guarantee_tests::lost_and_named;
-    use crate::{AirspaceRun, airspace_run};
-    use sidestep_kernel::Simulation;
+    use crate::scenario::CompiledAirspace;
     use sidestep_scenario::Source;
 
-    fn run(airspace: &str, model: &str, airplanes: &str) -> AirspaceRun {
+    fn compiled(airspace: &str, airplanes: &str) -> Result<CompiledAirspace, String> {
         let text = format!(
-            "format = 1\nworld = \"airspace\"\nseed = 3\n[airspace]\n{airspace}\n[airplane]\n{model}\n{airplanes}"
+            "format = 1\nworld = \"airspace\"\n[airspace]\n{airspace}\n{airplanes}\n\
+             [airspace.generator]\nkind = \"superconflict\"\nn = 3\n"
         );
-        airspace_run(&Source::new("s", text, ""), 1).expect("a scenario")
+        CompiledAirspace::new(&Source::new("s", text, "")).map_err(|error| error.to_string())
     }
 
-    const CONFLICT: &str = "[airspace.generator]\nkind = \"superconflict\"\nn = 6\n";
+    #[test]
+    fn surveillance_that_cannot_be_flown_is_refused_with_a_remedy() {
+        let silent = "[[airplanes]]\nat_m = [9000, 0]\nheading_deg = 0\nway_points_m = [[0, 0]]\n\
+                      non_cooperative = true\n";
+        let gusts = "surveillance = {}\ngusts = { noise_m_s = 1.0, correlation_s = 60.0 }";
+        for (airspace, airplanes, cause) in [
+            ("surveillance = { report_interval_s = 1.5 }", "", "no multiple of dtau_s = 1"),
+            ("surveillance = { report_interval_s = 0.2 }", "", "no multiple of dtau_s = 1"),
+            (
+                "method = \"mvp\"\nlook_every_s = 2.0\nsurveillance = { report_interval_s = 1.0 }",
+                "",
+                "no multiple of look_every_s = 2",
+            ),
+            (
+                "surveillance = { latency_s = 4.2, coast_s = 5.5 }",
+                "",
+                "give a coast_s of 6 or more",
+            ),
+            ("dtau_s = 0.01\nsurveillance = { coast_s = 200.0 }", "", "give up to 10000 steps"),
+            (
+                "deployment = \"team\"\nsurveillance = {}",
+                "[airspace.network]",
+                "have to see the same",
+            ),
+            ("surveillance = { reception_probability = 0.0 }", "", "reception_probability"),
+            (gusts, silent, "how far a gust"),
+        ] {
+            let error = compiled(airspace, airplanes).map(|_| ()).expect_err(cause);
+            assert!(error.contains(cause) && error.contains("help: "), "{airspace}: {error}");
+        }
+        assert!(compiled(gusts, "").is_ok());
+        assert!(compiled(&format!("shield = \"off\"\n{gusts}"), silent).is_ok());
+    }
 
     #[test]
-    fn positions_are_seen_as_accurately_as_the_category_of_each_airplane_says() {
-        let flight = |more: &str| {
-            format!(
-                "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9e6, 0]]\n{more}\n"
-            )
+    fn a_track_coasts_over_three_reports_of_a_slow_radar() {
+        let coast = |keys: &str| {
+            let compiled = compiled(&format!("surveillance = {{ {keys} }}"), "").expect("right");
+            compiled.world.surveillance.expect("given").coast_steps
         };
-        let airplanes = flight("nac_p = 8") + &flight("nac_p = 10\nnic = 10") + &flight("");
-        let run = run("position_noise_m = 4.0\nerror_sigmas = 3.0", "nic = 9", &airplanes);
-        let world = run.world();
-        let errors = [0, 1, 2].map(|i| (world.position_noise_m(i), world.position_bound_m(i)));
-        assert!(
-            (errors[0].0 - 37.83).abs() < 0.01 && (errors[1].0 - 4.085).abs() < 0.001,
-            "{errors:?}"
-        );
-        assert_eq!(errors[2].0, 4.0);
-        assert_eq!(errors.map(|(_, bound_m)| bound_m), [75.0, 25.0, 75.0]);
-        // 95 % of the positions that all see are within the radius of the category.
-        for (slot, radius_m) in [(0, 92.6), (1, 10.0)] {
-            let pose = world.airplanes[slot as usize].start;
-            let within = (0..4000).filter(|&now| {
-                let seen = crate::perceive::observed_pose(world, slot, now, pose);
-                crate::flight::distance_m(seen.at, pose.at) < radius_m
-            });
-            let share = within.count() as f64 / 4000.0;
-            assert!((share - 0.95).abs() < 0.015, "{slot}: {share}");
-        }
+        assert_eq!(coast(""), 10);
+        assert_eq!(coast("latency_s = 1.5, report_interval_s = 12.0"), 38);
+        assert_eq!(coast("coast_s = 25.9"), 25);
     }
 
     #[test]
-    fn within_the_radius_of_containment_nobody_loses_separation() {
-        for model in ["nac_p = 9\nnic = 8", "nac_p = 8\nnic = 7", "nac_p = 9"] {
-            for method in ["none", "mvp", "pc"] {
-                let mut run =
-                    run(&format!("method = \"{method}\"\nmax_rounds = 20"), model, CONFLICT);
-                run.advance(400);
-                let (lost, named) = lost_and_named(&run);
-                assert!(
-                    lost.is_empty() && named.is_empty(),
-                    "{model} {method}: {lost:?} {named:?}"
-                );
-                assert_eq!(run.metrics().arrived, 6, "{model} {method}");
-            }
+    fn another_seed_receives_other_reports_under_all_rules() {
+        let changes = "changes = [{ at_s = 50.0, wind_m_s = [3.0, 4.0] }]\nsurveillance = {}";
+        let compiled = compiled(changes, "").expect("right");
+        let other = compiled.reseeded(9).expect("right");
+        for world in other.world.all_rules() {
+            assert_eq!(world.surveillance.expect("given").max_wind_change_m_s, 5.0);
+            assert_eq!(world.streams, other.world.streams);
         }
-    }
-
-    #[test]
-    fn an_airplane_that_is_farther_off_than_its_radius_of_containment_is_named() {
-        let mut run = run("method = \"none\"", "nac_p = 7\nnic = 9", CONFLICT);
-        run.advance(100);
-        assert_eq!(run.metrics().beyond_bound.len(), 6);
-        let (lost, named) = lost_and_named(&run);
-        assert!(lost.is_subset(&named), "{lost:?} {named:?}");
     }
 }

@@ -7,6 +7,8 @@ use sidestep_scenario::{Integer, Number, Open, Rule, invalid_value, schema_by_ha
 
 /// A category of surveillance from 1 on: 0 stands for what is unknown.
 pub(crate) type SurveillanceCategory = Integer<1, 11>;
+/// A category of the accuracy of velocities from 1 on, likewise.
+pub(crate) type VelocityCategory = Integer<1, 4>;
 /// A separation in meters.
 pub(crate) type SeparationM = Number<Open<0, 1_000_000>>;
 

@@ -101,7 +101,7 @@ pub(crate) fn crowd() -> impl Strategy<Value = String> {
 }
 
 /// Flies some airplanes for ten minutes.
-fn only_named_pairs_lose(airspace: &str, airplanes: &str) -> Result<(), TestCaseError> {
+pub(crate) fn only_named_pairs_lose(airspace: &str, airplanes: &str) -> Result<(), TestCaseError> {
     let mut run = run(airspace, airplanes);
     run.advance(120);
     let (mut lost, named) = lost_and_named(&run);
@@ -252,7 +252,7 @@ fn every_deployment_minds_intruders_alike() {
 }
 
 /// Some recorded and silent airplanes that cross the traffic, with kinks and climbs.
-fn non_cooperative() -> impl Strategy<Value = String> {
+pub(crate) fn non_cooperative() -> impl Strategy<Value = String> {
     let coordinate = || -7000.0f64..7000.0;
     let one = ([coordinate(), coordinate(), coordinate(), coordinate()], 20.0f64..90.0, 0u8..4);
     let one = one.prop_map(|([x, y, to_x, to_y], v_m_s, kind)| match kind {

@@ -10,6 +10,7 @@ use crate::flight::Pose2;
 use crate::measures::FlightEffort;
 use crate::pilot::AirplaneControl;
 use crate::shield::Fallback;
+use crate::surveillance::StateVectorHistory;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::column::Packed;
 use sidestep_kernel::digest::Hasher;
@@ -82,6 +83,8 @@ pub struct Snapshot {
     pub efforts: Vec<FlightEffort>,
     /// The holds of each airplane by the shield, which affect no future; empty where none can be held.
     pub holds: Vec<HoldState>,
+    /// The past states of each airplane, of which its reports tell; empty where all see all.
+    pub state_vectors: Vec<StateVectorHistory>,
 }
 
 impl Snapshot {
@@ -127,6 +130,9 @@ impl Snapshot {
         if !self.external_actions.is_empty() {
             self.airplanes.iter().for_each(|a| hasher.write_u64(a.turn_rate_rad_s.to_bits()));
             hash_data(&mut hasher, &self.external_actions);
+        }
+        if !self.state_vectors.is_empty() {
+            hash_data(&mut hasher, &self.state_vectors);
         }
         if let Some(controls) = &self.controls {
             hash_data(&mut hasher, controls);

@@ -411,8 +411,12 @@ impl SettingsReader<'_> {
             Setting::AddedWind(wind) => self.now.winds.push(wind),
             Setting::NoWind => self.now.winds.clear(),
             Setting::Noise(true) => {
-                let cause = "its amounts are unknown; positions are exact".to_string();
-                self.refuse(timed, cause, "choose with --set airspace.position_noise_m=...");
+                // Of its model of ADS-B: 0.0001 degrees and 100 feet, the same for all who receive it.
+                let cause =
+                    "it also shakes each aircraft, and errs in altitude; positions are exact";
+                let remedy = "choose with --set airspace.position_noise_m=11.1, as much as its positions err, or with keys of \
+                              airspace.surveillance errors of each observer";
+                self.refuse(timed, cause.into(), remedy);
             }
             Setting::Noise(false) => {}
             Setting::Reset => self.now = SettingsInForce::default(),
