@@ -115,17 +115,21 @@ fn candidates_by_tracks(
     let PhaseContext { world, now, .. } = *context;
     let mut all = Vec::with_capacity(group.len());
     for (known, memory) in group.iter().zip(kept) {
-        let tracks = observations.tracks_of(known.slot);
+        let mut cooperative = Vec::new();
+        let mut non_cooperative = Vec::new();
+        for track in observations.tracks_of(known.slot) {
+            if world.is_non_cooperative(track.slot, now) {
+                non_cooperative.push(track.non_cooperative_aircraft(world));
+            } else {
+                cooperative.push(track);
+            }
+        }
         let others_at = |seconds: f64| {
-            let states = tracks.iter().map(|track| {
-                if world.is_non_cooperative(track.slot, now) {
-                    let seen = track.non_cooperative_aircraft(world);
-                    non_cooperative_state(world, &seen, seconds)
-                } else {
-                    track.aircraft_state(world, seconds)
-                }
-            });
-            states.collect()
+            let mut others = Vec::with_capacity(cooperative.len() + non_cooperative.len());
+            others.extend(cooperative.iter().map(|track| track.aircraft_state(world, seconds)));
+            let avoiding_nobody = non_cooperative.iter();
+            others.extend(avoiding_nobody.map(|one| non_cooperative_state(world, one, seconds)));
+            others
         };
         let own = std::slice::from_ref(known);
         let memory = std::slice::from_mut(memory);

@@ -27,6 +27,20 @@ fn chances(inspection: &Inspection) -> Option<Vec<f64>> {
     Some(table.column("probability").expect("a column").map(share).collect())
 }
 
+#[test]
+fn an_airplane_shows_its_tracks_and_how_far_they_are_off() {
+    let airspace = "method = \"mvp\"\nsurveillance = { latency_s = 2.0, position_noise_m = 30.0 }";
+    let mut run = run(airspace, 1, 3);
+    run.advance(5);
+    let inspection = inspect_airplane(&run, 0);
+    let table = inspection.section("Tracks").and_then(|section| section.table.as_ref());
+    let table = table.expect("tracks");
+    let ages: Vec<&FactValue> = table.column("last report").expect("a column").collect();
+    assert_eq!(ages, [&FactValue::number(2.0, "s"); 2]);
+    let all_see_all = self::run("method = \"mvp\"", 1, 3);
+    assert!(inspect_airplane(&all_see_all, 0).section("Tracks").is_none());
+}
+
 /// With sampled and with exact expectations, in every deployment.
 #[test]
 fn probabilities_of_the_actions_sum_to_1_and_the_chosen_one_is_flown_unless_the_shield_objects() {

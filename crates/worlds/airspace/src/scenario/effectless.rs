@@ -7,6 +7,7 @@ use crate::flight::{AirplaneStart, FlightTask, TurnLimit};
 use crate::method::MethodKind;
 use crate::settings::{Combinations, Resolution};
 use crate::surveillance::each_decides_by_tracks;
+use sidestep_kernel::distr::Bernoulli;
 use sidestep_scenario::Remark;
 
 /// Returns the remarks on a scenario, in the order of its keys.
@@ -80,6 +81,9 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
             "airplanes tell each other where they are, and none is non-cooperative",
         );
     }
+    if let Some(because) = effectless_coast(compiled) {
+        note("surveillance.coast_s", because);
+    }
     if let Some(safe_m) = compiled.world.safe_altitude_m {
         if compiled.world.all_rules().all(|rules| !rules.shield) {
             note("safe_altitude_m", "without the shield no airplane is held");
@@ -112,6 +116,14 @@ fn has_no_vertical_resolution(compiled: &CompiledAirspace) -> bool {
             let is_vertical = rules.mvp_resolution.resolution == Resolution::Vertical;
             is_vertical && rules.right_of_way.is_horizontal()
         })
+}
+
+/// Returns why the time for which tracks coast has no effect, if it is given and has none.
+fn effectless_coast(compiled: &CompiledAirspace) -> Option<&'static str> {
+    let section = compiled.recipe.file.airspace.surveillance.as_ref()?;
+    let settings = compiled.world.surveillance?;
+    let receives_all = settings.reception == Bernoulli::new(1.0) && settings.range_m.is_infinite();
+    (section.get_ref().has_coast() && receives_all).then_some("every report is received")
 }
 
 /// Returns whether any airplane is seen by reports under some of the rules.
@@ -430,6 +442,10 @@ mod tests {
         assert_eq!(remarks(&format!("{team}{keys}")), ["airspace.surveillance"]);
         let later = "changes = [{ at_s = 50.0, airplanes = [1], non_cooperative = true }]\n";
         assert_eq!(remarks(&format!("{later}{keys}")), [""; 0]);
+        let coast = "method = \"mvp\"\nsurveillance = { coast_s = 20.0 }\n";
+        assert_eq!(remarks(coast), ["airspace.surveillance.coast_s"]);
+        let missed = coast.replace("coast_s", "reception_probability = 0.5, coast_s");
+        assert_eq!(remarks(&missed), [""; 0]);
         let velocity = "method = \"mvp\"\n[airplane]\nnac_v = 2\n";
         assert_eq!(remarks(velocity), ["airplane.nac_v"]);
         assert_eq!(remarks(&format!("{keys}{velocity}")), [""; 0]);

@@ -46,7 +46,12 @@ pub(super) struct SurveillanceSection {
 }
 
 impl SurveillanceSection {
-    /// Returns whether a key is given that has an effect on errors alone.
+    /// Returns whether the time is given for which tracks coast.
+    pub(super) fn has_coast(&self) -> bool {
+        self.coast_s.is_some()
+    }
+
+    /// Returns whether sensors err in positions.
     pub(super) fn has_position_noise(&self) -> bool {
         self.position_noise_m.is_some_and(|noise_m| noise_m.get() > 0.0)
     }

@@ -72,10 +72,14 @@ impl GroupObservations {
         looks_at: impl Fn(bool) -> bool,
     ) -> Option<Self> {
         let PhaseContext { world, now, .. } = *context;
-        let archive = ReportArchive::new(context, group)?;
+        world.surveillance?;
+        let mut all = Self::default();
         let is_non_cooperative: Vec<bool> =
             group.iter().map(|&slot| world.is_non_cooperative(slot, now)).collect();
-        let mut all = Self::default();
+        if !is_non_cooperative.iter().any(|&one| looks_at(one)) {
+            return Some(all);
+        }
+        let archive = ReportArchive::new(context, group)?;
         let observers = (0..group.len()).filter(|&place| !is_non_cooperative[place]);
         for observer in observers {
             let mut tracks = Vec::new();

@@ -60,7 +60,7 @@ impl PerceivedTraffic {
     pub(crate) fn record(&self, context: &mut PhaseContext<'_>, group: &[EntitySlot]) {
         let Some(observations) = &self.observations else { return };
         observations.record(context);
-        if !context.world.shield {
+        if !context.world.shield || self.non_cooperative.is_empty() {
             return;
         }
         let mut beyond = Vec::new();

@@ -56,28 +56,30 @@ impl<'a, 'b> ReportArchive<'a, 'b> {
 
     /// Returns the last report that an observer has received of another airplane, by their places in the group.
     pub(super) fn last_report(&self, pair: [usize; 2]) -> LastReport {
-        let [_, subject] = pair;
-        let SurveillanceSettings { interval_steps, latency_steps, coast_steps, .. } = self.settings;
-        let Some(latest) = self.now_step.checked_sub(latency_steps) else {
-            return LastReport::None;
-        };
+        if let Some(step) = self.latest_received(pair, self.now_step) {
+            return LastReport::Recent(step);
+        }
         let steps_per_cycle = self.context.world.timing.points_per_dt() as u64;
-        let oldest = self.now_step.saturating_sub(coast_steps + steps_per_cycle - 1);
-        let offset = self.report_offset(subject);
-        let Some(since_offset) = latest.checked_sub(offset) else { return LastReport::None };
-        let mut step = latest - since_offset % interval_steps;
+        let before = self.now_step.checked_sub(steps_per_cycle);
+        let dropped = before.and_then(|before| self.latest_received(pair, before));
+        dropped.map_or(LastReport::None, LastReport::JustDropped)
+    }
+
+    /// Returns the step of the latest report from which an observer has a track at a step.
+    fn latest_received(&self, pair: [usize; 2], at_step: u64) -> Option<u64> {
+        let SurveillanceSettings { interval_steps, latency_steps, coast_steps, .. } = self.settings;
+        let latest = at_step.checked_sub(latency_steps)?;
+        let oldest = at_step.saturating_sub(coast_steps);
+        let [_, subject] = pair;
+        let since_first = latest.checked_sub(self.report_offset(subject))?;
+        let mut step = latest - since_first % interval_steps;
         while step >= oldest {
             if self.is_received(pair, step) {
-                return if self.now_step - step <= coast_steps {
-                    LastReport::Recent(step)
-                } else {
-                    LastReport::JustDropped(step)
-                };
+                return Some(step);
             }
-            let Some(before) = step.checked_sub(interval_steps) else { break };
-            step = before;
+            step = step.checked_sub(interval_steps)?;
         }
-        LastReport::None
+        None
     }
 
     /// Returns the first step in which an airplane reports: not all do at the same time.
