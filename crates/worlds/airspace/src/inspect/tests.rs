@@ -31,13 +31,15 @@ fn chances(inspection: &Inspection) -> Option<Vec<f64>> {
 fn an_airplane_shows_its_tracks_and_how_far_they_are_off() {
     let airspace = "method = \"mvp\"\nsurveillance = { latency_s = 2.0, position_noise_m = 30.0 }";
     let mut run = run(airspace, 1, 3);
-    run.advance(5);
+    // By then they are so near that they have to avoid each other.
+    run.advance(20);
     let inspection = inspect_airplane(&run, 0);
     let table = inspection.section("Tracks").and_then(|section| section.table.as_ref());
     let table = table.expect("tracks");
     let ages: Vec<&FactValue> = table.column("last report").expect("a column").collect();
     assert_eq!(ages, [&FactValue::number(2.0, "s"); 2]);
-    let all_see_all = self::run("method = \"mvp\"", 1, 3);
+    let mut all_see_all = self::run("method = \"mvp\"", 1, 3);
+    all_see_all.advance(20);
     assert!(inspect_airplane(&all_see_all, 0).section("Tracks").is_none());
 }
 
