@@ -186,6 +186,83 @@ fn with_reports_that_are_late_or_missing_mvp_loses_more_and_beside_the_shield_no
     assert_eq!(shielded.metrics().losses_of_separation, 0);
 }
 
+/// The scenario of surveillance with another chance of reception and another seed; without one all see all.
+fn scenario(method: &str, reception: Option<f64>, shield: &str, seed: u64) -> AirspaceRun {
+    let text = include_str!("../../../../../scenarios/airspace/surveillance.toml");
+    let section = text
+        .split("[airspace.surveillance]")
+        .nth(1)
+        .and_then(|rest| rest.split("[airspace").next());
+    let section = section.expect("a section");
+    let quality = reception.map_or(String::new(), |p| {
+        let keys = section
+            .replace("reception_probability = 0.2", &format!("reception_probability = {p:?}"));
+        format!("[airspace.surveillance]{keys}")
+    });
+    let text = text
+        .replace(&format!("[airspace.surveillance]{section}"), &quality)
+        .replace("method = \"mvp\"", &format!("method = {method:?}"))
+        .replace("shield = \"off\"", &format!("shield = {shield:?}"))
+        .replace("name = ", &format!("seed = {seed}\nname = "));
+    airspace_run(&Source::new("s", text, ""), 1).expect("a scenario")
+}
+
+#[test]
+fn the_scenario_of_surveillance_loses_separation_by_missing_reports_and_not_with_the_shield() {
+    let flown = |reception: Option<f64>, shield: &str| {
+        let mut run = scenario("mvp", reception, shield, 1);
+        run.advance(600);
+        run.metrics()
+    };
+    let shipped = flown(Some(0.2), "off");
+    assert!(shipped.track_availability.is_some_and(|share| (0.8..1.0).contains(&share)));
+    assert_eq!(flown(None, "off").track_availability, None);
+    let shielded = flown(Some(0.2), "on");
+    assert_eq!((shielded.losses_of_separation, shielded.arrived), (0, 8));
+}
+
+/// Prints the table in the book.
+#[test]
+#[ignore = "some hundred runs: minutes"]
+fn losses_of_methods_by_the_share_of_reports_that_are_received() {
+    let seeds = 20;
+    for method in ["mvp", "orca", "bands"] {
+        for reception in [None, Some(1.0), Some(0.5), Some(0.2), Some(0.1), Some(0.05)] {
+            let mut losses = 0;
+            let mut losing_runs = 0;
+            let mut delay_percent = 0.0;
+            let mut availability = 0.0;
+            let mut age_s = 0.0;
+            let mut shielded_losses = 0;
+            let mut shielded_delay_percent = 0.0;
+            for seed in 1..=seeds {
+                let mut run = scenario(method, reception, "off", seed);
+                run.advance(1000);
+                let metrics = run.metrics();
+                losses += metrics.losses_of_separation;
+                losing_runs += u64::from(metrics.losses_of_separation > 0);
+                delay_percent += metrics.mean_delay_percent.unwrap_or(f64::NAN);
+                availability += metrics.track_availability.unwrap_or(1.0);
+                age_s += metrics.mean_track_age_s.unwrap_or(0.0);
+                let mut shielded = scenario(method, reception, "on", seed);
+                shielded.advance(1000);
+                let metrics = shielded.metrics();
+                shielded_losses += metrics.losses_of_separation;
+                shielded_delay_percent += metrics.mean_delay_percent.unwrap_or(f64::NAN);
+            }
+            let mean = |sum: f64| sum / seeds as f64;
+            println!(
+                "{method} {reception:?}: {:.1} % tracked, {:.2} s old; {losses} losses, in {losing_runs} of {seeds} runs, \
+                 delay {:.2} %; with the shield {shielded_losses}, delay {:.2} %",
+                100.0 * mean(availability),
+                mean(age_s),
+                mean(delay_percent),
+                mean(shielded_delay_percent)
+            );
+        }
+    }
+}
+
 /// The first airplane never receives a report of the second one, which flies through it.
 #[test]
 fn a_pair_with_an_airplane_that_nobody_sees_is_named_before_it_loses_separation() {
