@@ -13,7 +13,7 @@
 mod approaches;
 mod areas;
 #[cfg(test)]
-mod command_tests;
+pub(super) mod command_tests;
 mod commands;
 mod controls;
 mod direct;

@@ -232,10 +232,10 @@ impl AirspaceWorld {
                 |reached: ReachedCost| reached.cost.is_finite() && reached.bound.is_finite();
             is_action && status.reached.is_none_or(has_costs)
         });
-        // Deployments with pilots are refused where a method commands anything.
-        let is_without_command = control.memory.command.is_none();
+        // The airspace brings it within the limits of the airplane.
+        let is_command_valid = self.command_kinds().allows(&control.memory.command);
         let is_memory_valid =
-            are_known && are_contacts_valid && are_resolutions_valid && is_without_command;
+            are_known && are_contacts_valid && are_resolutions_valid && is_command_valid;
         if are_events_valid && is_memory_valid && is_status_valid {
             return Ok(());
         }

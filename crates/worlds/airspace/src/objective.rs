@@ -8,7 +8,8 @@
 
 use super::areas::{AreaContext, LocalArea};
 use super::flight::{
-    FlightLevelRange, Frame, PairPlane, Point, Prediction, RigidMotion, SteadyChange, distance_m,
+    Action, ChangeableFlight, FlightLevelRange, Frame, PairPlane, Point, Prediction, RigidMotion,
+    SteadyChange, TimeDiscretization, distance_m,
 };
 use super::non_cooperative::NonCooperativeAircraft;
 use serde::{Deserialize, Serialize};
@@ -65,13 +66,25 @@ impl Objective {
         b: &Prediction,
         r: [f64; 2],
     ) -> [f64; 2] {
+        self.collision_costs_where(plane, [a, b], r, |_| true)
+    }
+
+    /// Returns the same of the points alone at which the two are on levels that meet, as `meets` tells by their number.
+    pub(super) fn collision_costs_where(
+        &self,
+        plane: &PairPlane,
+        [a, b]: [&Prediction; 2],
+        r: [f64; 2],
+        meets: impl Fn(usize) -> bool,
+    ) -> [f64; 2] {
         let end = self.counted_points(a).min(self.counted_points(b));
         let mut sums = [0.0; 2];
         let mut weight = 1.0;
         let slices = a.points[..end].chunks(SLICE).zip(b.points[..end].chunks(SLICE));
         let terms = PairTerms { plane, r };
-        for (of_a, of_b) in slices {
-            let parts = self.slice_collision_costs(terms, [of_a, of_b], weight, |_| true);
+        for (k, (of_a, of_b)) in slices.enumerate() {
+            let meets_in_slice = |point: usize| meets(k * SLICE + point);
+            let parts = self.slice_collision_costs(terms, [of_a, of_b], weight, meets_in_slice);
             sums[0] += parts[0];
             sums[1] += parts[1];
             weight = self.next_slice_weight(weight);
@@ -210,10 +223,7 @@ impl ActionPredictions {
     /// Returns the same options with the altitudes and speeds that the actions lead to.
     #[must_use]
     pub(crate) fn with_changes(mut self, changes: ActionChanges) -> Self {
-        let ranges = changes.altitudes.iter().map(|one| one.range(0.0, changes.horizon_s));
-        self.levels = ranges.fold(self.levels, |levels, range| {
-            levels.extended_by_level(range.low_m).extended_by_level(range.high_m)
-        });
+        self.levels = changes.extend(self.levels);
         let starts =
             (0..self.predictions.first().map_or(0, |first| first.points.len())).step_by(SLICE);
         let altitudes = Some(changes.altitudes.as_slice());
@@ -231,14 +241,16 @@ impl ActionPredictions {
     }
 
     /// Returns the levels that an action leads to in one step.
-    fn step_levels(&self, action: usize, step: usize) -> FlightLevelRange {
+    pub(super) fn step_levels(&self, action: usize, step: usize) -> FlightLevelRange {
         match &self.changes {
             None => self.levels,
-            Some(ActionChanges { altitudes, dtau_s, .. }) => {
-                let from_s = step as f64 * dtau_s;
-                altitudes[action].range(from_s, from_s + dtau_s)
-            }
+            Some(changes) => changes.step_levels(action, step),
         }
+    }
+
+    /// Returns whether actions change levels or speeds.
+    pub(super) fn has_changes(&self) -> bool {
+        self.changes.is_some()
     }
 
     /// Returns the same options with a factor on the cost of deviations.
@@ -339,6 +351,34 @@ pub(crate) struct ActionChanges {
 }
 
 impl ActionChanges {
+    /// Returns those of some actions.
+    pub(crate) fn new(
+        flight: &ChangeableFlight<'_>,
+        actions: &[Action],
+        timing: &TimeDiscretization,
+    ) -> Self {
+        Self {
+            altitudes: actions.iter().map(|action| flight.altitudes(action.change)).collect(),
+            speeds: actions.iter().map(|action| flight.speeds(action.change)).collect(),
+            dtau_s: timing.dtau_s,
+            horizon_s: timing.horizon_s(),
+        }
+    }
+
+    /// Returns the levels of all actions within the horizon, beside some others.
+    pub(crate) fn extend(&self, levels: FlightLevelRange) -> FlightLevelRange {
+        let ranges = self.altitudes.iter().map(|one| one.range(0.0, self.horizon_s));
+        ranges.fold(levels, |levels, range| {
+            levels.extended_by_level(range.low_m).extended_by_level(range.high_m)
+        })
+    }
+
+    /// Returns the levels of an action in one step.
+    pub(crate) fn step_levels(&self, action: usize, step: usize) -> FlightLevelRange {
+        let from_s = step as f64 * self.dtau_s;
+        self.altitudes[action].range(from_s, from_s + self.dtau_s)
+    }
+
     /// Returns the squares of the deviations of altitude and speed of an action from the optimal one, by their weights.
     fn deviation_cost(&self, objective: &Objective, action: usize) -> f64 {
         let [of_level, of_speed] = [&self.altitudes, &self.speeds].map(|changes| {

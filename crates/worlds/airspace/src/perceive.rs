@@ -80,6 +80,7 @@ pub(super) fn ownship_state(context: &PhaseContext<'_>, slot: EntitySlot) -> Own
         next: current.next.get(),
         orders: current.orders.get().into(),
         command: state.command_in_force(slot),
+        is_overridden: state.has_commands() && state.is_overridden(slot),
         fallback: current.fallback.get(),
         refusals: current.overrides.get(),
         exempt: state.exempt_ids(slot).to_vec(),
@@ -101,6 +102,7 @@ pub(super) fn surveillance_report(
         orbit: (current.orbiting.get() > 0).then(|| current.fallback.get().orbit_side),
         tracked: (world.has_common_plan(slot) && current.tracked.get() > 0)
             .then(|| TrackedState { next: current.next.get(), fallback: current.fallback.get() }),
+        command: state.command_in_force(slot),
     }
 }
 

@@ -8,13 +8,13 @@ mod tests;
 use super::areas::{AreaContext, Areas, LocalAreas};
 use super::baseline::mvp::{MvpRules, ResolutionSettings};
 use super::flight::{
-    Action, AirplaneStart, ChangeableFlight, Chart, CommandKinds, DetourAlternatives, DoneOrders,
-    FlightChange, FlightConditions, FlightLevelRange, FlightOrder, FlightPhase, FlightTask, Gusts,
-    InterOrderSegment, KnownAircraft, MethodCommand, Point, Pose2, RoutePosition,
-    SegmentAfterOrder, Surface, TimeDiscretization, Track, WaypointRule, WindField, actions,
-    actions_at_turn_rate, segments_after_orders,
+    Action, AirplaneStart, ChangeableFlight, Chart, CommandKinds, CommandLimits,
+    DetourAlternatives, DoneOrders, FiledLevelSpeed, FlightChange, FlightConditions,
+    FlightLevelRange, FlightOrder, FlightPhase, FlightTask, Gusts, InterOrderSegment,
+    KnownAircraft, MethodCommand, Point, Pose2, RoutePosition, SegmentAfterOrder, Surface,
+    TimeDiscretization, Track, WaypointRule, WindField, actions, actions_at_turn_rate,
+    segments_after_orders,
 };
-use super::flight_plan::CLIMB_M_S;
 use super::measures::{FlightEffort, MeasureSettings};
 use super::method::MethodKind;
 use super::non_cooperative::NonCooperativeAircraft;
@@ -135,6 +135,8 @@ pub struct AirspaceWorld {
     pub(crate) later: Arc<Vec<Vec<SegmentAfterOrder>>>,
     /// The turn rate of each airplane's orbits, in radians per second.
     pub(crate) orbit_rad_s: Arc<Vec<f64>>,
+    /// The commands that may be in force for each airplane; empty where no method commands anything.
+    pub(crate) command_limits: Arc<[CommandLimits]>,
     /// The greatest speed of each airplane, in meters per second.
     pub(crate) top_m_s: Arc<Vec<f64>>,
     /// Seconds that each airplane would need if it were alone.
@@ -205,6 +207,7 @@ impl AirspaceWorld {
             self.actions = Arc::clone(&known.actions);
             self.orbit_rad_s = Arc::clone(&known.orbit_rad_s);
             self.top_m_s = Arc::clone(&known.top_m_s);
+            self.command_limits = Arc::clone(&known.command_limits);
         } else {
             self.actions = Arc::new(
                 self.airplanes
@@ -216,6 +219,7 @@ impl AirspaceWorld {
             );
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
             self.top_m_s = Arc::new(self.map_airplanes(Self::max_speed_m_s));
+            self.command_limits = self.limits_of_commands();
         }
         self.fallbacks =
             Arc::new((0..self.airplanes.len()).map(|i| self.fallback_choices(i)).collect());
@@ -464,6 +468,18 @@ impl AirspaceWorld {
         self.all_rules().any(|world| !world.command_kinds().is_none())
     }
 
+    /// Returns the commands that may be in force for each airplane; none where no method commands anything.
+    fn limits_of_commands(&self) -> Arc<[CommandLimits]> {
+        let kinds = self.command_kinds();
+        let airplanes = self.airplanes.iter().filter(|_| !kinds.is_none());
+        airplanes.map(|airplane| airplane.command_limits(kinds)).collect()
+    }
+
+    /// Returns whether a command may be in force for an airplane.
+    pub(crate) fn allows_command(&self, id: EntityId, command: &MethodCommand) -> bool {
+        CommandLimits::allow(&self.command_limits, id, command)
+    }
+
     /// Returns when a cycle starts, in seconds after the start of the run.
     pub fn cycle_start_s(&self, now: Cycle) -> f64 {
         now as f64 * self.timing.dt_s
@@ -709,12 +725,7 @@ impl AirspaceWorld {
         let mut options =
             ActionPredictions::new(predictions, frame, model.separation_m, self.levels(known));
         if let Some(flight) = flight {
-            options = options.with_changes(ActionChanges {
-                altitudes: actions.iter().map(|action| flight.altitudes(action.change)).collect(),
-                speeds: actions.iter().map(|action| flight.speeds(action.change)).collect(),
-                dtau_s: self.timing.dtau_s,
-                horizon_s: self.timing.horizon_s(),
-            });
+            options = options.with_changes(ActionChanges::new(&flight, &actions, &self.timing));
         }
         options
             .with_non_cooperative(non_cooperative, &self.objective, self.timing.dtau_s)
@@ -727,19 +738,28 @@ impl AirspaceWorld {
         if airplane.changes.is_empty() {
             return None;
         }
-        let filed = self.segment(known.slot, known.orders);
-        let performance = &airplane.performance;
-        Some(ChangeableFlight {
-            altitude_m: known.altitude_m,
-            filed_altitude_m: filed.altitude_m,
-            climb_m_s: CLIMB_M_S.min(performance.climb_max_m_s),
-            filed_climb_m_s: filed.climb_m_s,
-            descent_m_s: CLIMB_M_S.min(performance.descent_max_m_s),
-            filed_descent_m_s: filed.descent_m_s,
-            v_m_s: self.known_segment(known).model.v_m_s,
-            filed_v_m_s: filed.model.v_m_s,
-            performance,
+        let filed = FiledLevelSpeed::from(&self.segment(known.slot, known.orders));
+        let v_m_s = self.known_segment(known).model.v_m_s;
+        Some(ChangeableFlight::new(filed, &airplane.performance, known.altitude_m, v_m_s))
+    }
+
+    /// Returns some levels of an airplane, and those that its actions lead to within the horizon.
+    pub(crate) fn levels_with_changes(
+        &self,
+        known: KnownAircraft,
+        levels: FlightLevelRange,
+    ) -> FlightLevelRange {
+        let flight = self.changeable_flight(known).filter(|_| self.changes.levels);
+        let actions = self.actions(known.slot);
+        flight.map_or(levels, |flight| {
+            ActionChanges::new(&flight, actions, &self.timing).extend(levels)
         })
+    }
+
+    /// Returns the level and the speed of an airplane's filed flight after each number of its orders.
+    pub(crate) fn filed_levels_speeds(&self, slot: EntitySlot) -> Vec<FiledLevelSpeed> {
+        let orders = 0..=self.airplanes[slot as usize].orders.len();
+        orders.map(|done| (&self.segment(slot, done as u32)).into()).collect()
     }
 
     /// Returns the command that an action of an airplane is.

@@ -25,24 +25,28 @@ fn source(airspace: &str, airplanes: &str) -> Source {
     Source::new("commands", text, "")
 }
 
-fn run(airspace: &str, airplanes: &str) -> AirspaceRun {
+pub(crate) fn run(airspace: &str, airplanes: &str) -> AirspaceRun {
     airspace_run(&source(airspace, airplanes), 1).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn run_own(method: impl Method + 'static, airspace: &str, airplanes: &str) -> AirspaceRun {
+pub(crate) fn run_own(
+    method: impl Method + 'static,
+    airspace: &str,
+    airplanes: &str,
+) -> AirspaceRun {
     let source = source(&format!("method = \"own\"\n{airspace}"), airplanes);
     let method: Arc<dyn Method> = Arc::new(method);
     let own = Methods::from([("own".to_string(), method)]);
     CompiledAirspace::with_methods(&source, &own).expect("a scenario").start(&source, 1)
 }
 
-fn by_mvp(resolution: &str, more: &str) -> String {
+pub(crate) fn by_mvp(resolution: &str, more: &str) -> String {
     format!("method = \"mvp\"\nmvp = {{ resolution = \"{resolution}\" }}\n{more}")
 }
 
 /// Commands at random, sometimes nothing, and turns at random.
 #[derive(Debug)]
-struct AtRandom;
+pub(crate) struct AtRandom;
 
 impl Method for AtRandom {
     fn decide(&self, percept: &MethodPercept<'_>, draws: &mut Draws) -> Steering {
@@ -139,7 +143,7 @@ proptest! {
 }
 
 /// Two that meet head-on on one level, and two that meet at right angles beside them.
-fn meeting() -> String {
+pub(crate) fn meeting() -> String {
     let far = "altitude_m = 2000.0";
     plane([-6000.0, 0.0], 0.0, [12_000.0, 0.0], far)
         + &plane([6000.0, 100.0], 180.0, [-12_000.0, 100.0], far)
@@ -265,18 +269,6 @@ fn rules_that_change_to_another_method_give_commands_back() {
     assert!((0..4).any(|slot| speed_and_level(&run, slot).altitude_m != 2000.0));
     run.advance(20);
     assert!((0..4).all(|slot| speed_and_level(&run, slot).altitude_m == 2000.0));
-}
-
-#[test]
-fn agents_and_networks_are_refused_with_a_remedy() {
-    for more in ["deployment = \"team\"", "deployment = \"replica-team\"\nnetwork = { loss = 0.1 }"]
-    {
-        let refused = airspace_run(&source(&by_mvp("vertical", more), &meeting()), 1);
-        let error = refused.expect_err(more).to_string();
-        assert!(error.contains("commands levels or speeds"), "{error}");
-        assert!(error.contains("resolution = \"heading\""), "{error}");
-        airspace_run(&source(&by_mvp("heading", more), &meeting()), 1).expect("as ever");
-    }
 }
 
 #[test]

@@ -6,7 +6,7 @@
 //! that the invariant holds for them, too. Where there is none it levels off just short of them, and goes on once there
 //! is. So those far above delay nobody on the ground.
 
-use super::protect::shielded_aircraft;
+use super::protect::changing_aircraft;
 use crate::avoid::NonCooperativeAvoidance;
 use crate::events::{Event, EventKind};
 use crate::flight::FlightLevelRange;
@@ -49,7 +49,7 @@ pub(super) fn clear_levels(
     }
     let non_cooperative = PerceivedTraffic::non_cooperative_aircraft(context, group);
     let mut all: Vec<ShieldedAircraft> =
-        flown.iter().map(|&slot| shielded_aircraft(context, slot)).collect();
+        flown.iter().map(|&slot| changing_aircraft(context, slot)).collect();
     // One after the other, each with regard to the levels that those before it pass: by falling rank, as everywhere.
     changing.sort_unstable_by_key(|&k| std::cmp::Reverse(all[k].rank));
     for k in changing {

@@ -4,7 +4,7 @@
 //! ones, because otherwise the invariant would be lost; until then the order waits, and so do those after it. A new level
 //! is accepted at once, and the way to it cleared in stages (`levels.rs`).
 
-use super::protect::shielded_aircraft;
+use super::protect::{changing_aircraft, shielded_aircraft};
 use crate::flight::{AircraftModel, DoneOrders, FlightOrder};
 use crate::scratch::PhaseContext;
 use crate::shield::{Fallback, ShieldedAircraft, safe_fallback};
@@ -62,7 +62,7 @@ pub(super) fn fallback_at_speed(
     slot: EntitySlot,
     model: &AircraftModel,
 ) -> Option<Fallback> {
-    let before = shielded_aircraft(context, slot);
+    let before = changing_aircraft(context, slot);
     let changed = ShieldedAircraft {
         v_m_s: model.v_m_s,
         omega_max_rad_s: model.omega_max_rad_s,

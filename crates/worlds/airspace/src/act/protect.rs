@@ -16,6 +16,16 @@ pub(super) fn shielded_aircraft(context: &PhaseContext<'_>, slot: EntitySlot) ->
     ownship_state(context, slot).shielded_aircraft(context.world, context.now)
 }
 
+/// Returns an airplane that is about to change its level or its speed, with the fallbacks that it may have then. Where
+/// messages get lost only the stored one: others reckon with that, and may not hear of another one.
+pub(super) fn changing_aircraft(context: &PhaseContext<'_>, slot: EntitySlot) -> ShieldedAircraft {
+    let aircraft = shielded_aircraft(context, slot);
+    if context.world.network.is_none() {
+        return aircraft;
+    }
+    ShieldedAircraft { choices: [aircraft.fallback].into(), ..aircraft }
+}
+
 /// Exempts an airplane and the non-cooperative ones that could come too near on its path within `dt`, and ends the
 /// exemption of pairs with others.
 pub(super) fn exempt_non_cooperative(

@@ -47,13 +47,14 @@ mod tests;
 
 use super::link::{self, MessageLimits};
 use super::participant::InvalidMessage;
-use crate::flight::Surface;
+use crate::flight::{CommandLimits, Surface};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::PlanCertainty;
 pub use beacon::{Beacon, GroupingMessageItem, SurveillanceReport, TrackedState};
 use beacon_store::BeaconStore;
 use sidestep_kernel::EntityId;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Largest number of items of a message: enough for most groups in one message, and few enough that the bound on its
 /// bytes, which must hold before a message is read, stays small.
@@ -72,6 +73,8 @@ pub struct GroupingInput {
     pub expected: Vec<bool>,
     /// Number of all airplanes.
     pub airplanes: usize,
+    /// The commands that may be in force for each of them; empty where no method commands anything.
+    pub command_limits: Arc<[CommandLimits]>,
     /// The surface that all fly over.
     pub surface: Surface,
     /// Distance in meters that messages reach.
@@ -286,7 +289,7 @@ impl link::ProtocolAgent for GroupingAgent {
     ) -> Result<(), InvalidMessage> {
         InvalidMessage::Length.ensure((1..=MAX_ITEMS).contains(&items.len()))?;
         items.iter().try_for_each(|item| {
-            item.check(self.input.airplanes)?;
+            item.check(self.input.airplanes, &self.input.command_limits)?;
             let near = &self.input.near;
             let place = near.binary_search_by_key(&item.subject_id(), |one| one.id);
             if let (GroupingMessageItem::Beacon(beacon), Ok(k)) = (item, place) {

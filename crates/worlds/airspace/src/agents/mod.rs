@@ -36,7 +36,9 @@ pub mod traffic_state;
 pub use conversation::{Conversation, ConversationSetup};
 pub use link::{EndpointConfig, MessageLimits, ProtocolAgent, ReliableEndpoint};
 pub(crate) use optimizer::OptimizingAgent;
-pub use ownship::{CommonKnowledge, FiledFlight, Ownship};
+pub use ownship::{
+    CommandedFlight, CommonKnowledge, FiledChanges, FiledFlight, Ownship, RouteProgress,
+};
 pub use participant::{
     ConversationEnd, ConversationProgress, FinishableParticipant, InvalidMessage, OutgoingMessage,
     Participant,

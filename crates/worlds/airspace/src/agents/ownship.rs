@@ -5,11 +5,12 @@ use super::participant::{InvalidMessage, are_valid_coordinates};
 use super::traffic_state::{LastKnownState, StateBeacon, TrafficPicture};
 use crate::areas::{AreaContext, Areas};
 use crate::flight::{
-    Action, AircraftModel, FlightConditions, Frame, KnownAircraft, Point, Pose2, Prediction,
-    RoutePosition, TurnLimit, actions_at_turn_rate,
+    Action, AircraftModel, ChangeableFlight, FiledLevelSpeed, FlightConditions, Frame,
+    KnownAircraft, MethodCommand, Performance, Point, Pose2, Prediction, RoutePosition, TurnLimit,
+    actions_at_turn_rate,
 };
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::objective::{ActionPredictions, Objective};
+use crate::objective::{ActionChanges, ActionPredictions, Objective};
 use crate::purpose;
 use sidestep_collectives::{Estimator, OptimizerConfig, Player};
 use sidestep_kernel::stream::Streams;
@@ -41,10 +42,30 @@ pub struct CommonKnowledge {
     pub areas: Areas,
     /// The wind around each of the group, in meters per second, in the order of the ids.
     pub winds_m_s: Vec<Point>,
+    /// What all see of the levels and the speeds of the group, in the order of the ids; empty where no method commands any.
+    pub commanded: Vec<CommandedFlight>,
     /// Whether the shield keeps airplanes that are not heard on their orbits.
     pub is_shielded: bool,
     /// Factor on the cost of deviations of each of the group, in the order of the ids.
     pub deviation_weights: Vec<f64>,
+}
+
+/// What all see of an airplane whose level and speed a method may command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandedFlight {
+    /// Altitude in meters.
+    pub altitude_m: f64,
+    /// The command that is in force.
+    pub command: MethodCommand,
+}
+
+/// The filed level and speed of an airplane whose actions change them.
+#[derive(Debug, Clone)]
+pub struct FiledChanges {
+    /// What the airplane can fly.
+    pub performance: Performance,
+    /// Its level and its speed after each number of its orders.
+    pub filed: Vec<FiledLevelSpeed>,
 }
 
 /// A flight as it was filed: what all others know of it without a message.
@@ -64,6 +85,19 @@ pub struct FiledFlight {
     pub max_way_points: usize,
     /// Number of orders that it will be given.
     pub orders: usize,
+    /// What its actions change; none where they are turns alone.
+    pub changes: Option<FiledChanges>,
+}
+
+/// The part of a flight that only the airplane knows, and sends.
+#[derive(Debug, Clone, Copy)]
+pub struct RouteProgress<'a> {
+    /// Way-points that it is to reach.
+    pub mission: &'a [Point],
+    /// Number of way-points done with.
+    pub next: usize,
+    /// Number of its orders that are carried out.
+    pub orders: u32,
 }
 
 impl CommonKnowledge {
@@ -72,9 +106,9 @@ impl CommonKnowledge {
         &self,
         place: usize,
         beacon: &StateBeacon,
-        mission: &[Point],
-        next: usize,
+        progress: RouteProgress<'_>,
     ) -> ActionPredictions {
+        let RouteProgress { mission, next, orders } = progress;
         let FiledFlight { model: filed, actions, .. } = &self.filed[place];
         let model = AircraftModel {
             v_m_s: beacon.v_m_s,
@@ -84,12 +118,82 @@ impl CommonKnowledge {
         };
         let route = RoutePosition { mission, next, pose: beacon.pose };
         let actions = actions_at_turn_rate(actions, filed, beacon.omega_max_rad_s);
-        let predictions = self.air_around(place).predictions(&model, &actions, route, None);
+        let flight = self.changeable_flight(place, orders, beacon.v_m_s);
+        let air = self.air_around(place);
+        let predictions = air.predictions(&model, &actions, route, flight.as_ref());
         let frame = self.air.surface.frame_at(beacon.pose.at);
-        ActionPredictions::new(predictions, frame, beacon.separation_m, beacon.levels)
+        let options =
+            ActionPredictions::new(predictions, frame, beacon.separation_m, beacon.levels);
+        let timing = &self.air.timing;
+        let changes = flight.map(|flight| ActionChanges::new(&flight, &actions, timing));
+        self.with_costs(place, options, changes)
+    }
+
+    /// Returns the options of an airplane by the predictions that it sends; `changes` are those of its actions.
+    pub(super) fn heard_options(
+        &self,
+        place: usize,
+        beacon: &StateBeacon,
+        predictions: Vec<Prediction>,
+        changes: Option<ActionChanges>,
+    ) -> ActionPredictions {
+        let StateBeacon { separation_m, levels, .. } = *beacon;
+        let options = ActionPredictions::new(predictions, self.frame(place), separation_m, levels);
+        self.with_costs(place, options, changes)
+    }
+
+    /// Returns the options of the airplane at a place with all that others know of them.
+    fn with_costs(
+        &self,
+        place: usize,
+        mut options: ActionPredictions,
+        changes: Option<ActionChanges>,
+    ) -> ActionPredictions {
+        if let Some(changes) = changes {
+            options = options.with_changes(changes);
+        }
+        options
             .with_non_cooperative(&self.non_cooperative, &self.objective, self.air.timing.dtau_s)
             .with_areas(&self.area_context(), &self.objective, self.air.timing.dtau_s)
             .with_deviation_weight(self.deviation_weights[place])
+    }
+
+    /// Returns what the airplane at a place flies and would fly by its filed flight after some orders; `None` if it has no
+    /// changes to choose from.
+    fn changeable_flight(
+        &self,
+        place: usize,
+        orders: u32,
+        v_m_s: f64,
+    ) -> Option<ChangeableFlight<'_>> {
+        let FiledChanges { performance, filed } = self.filed[place].changes.as_ref()?;
+        let altitude_m = self.commanded[place].altitude_m;
+        Some(ChangeableFlight::new(*filed.get(orders as usize)?, performance, altitude_m, v_m_s))
+    }
+
+    /// Returns the altitudes and the speeds that the actions of the airplane at a place lead to, by what it sends; none
+    /// where they are turns alone.
+    pub(super) fn action_changes(
+        &self,
+        place: usize,
+        orders: u32,
+        beacon: &StateBeacon,
+    ) -> Option<ActionChanges> {
+        let flight = self.changeable_flight(place, orders, beacon.v_m_s)?;
+        Some(ActionChanges::new(&flight, &self.filed[place].actions, &self.air.timing))
+    }
+
+    /// Returns whether the actions of some airplane of the group change levels or speeds.
+    pub(super) fn has_changes(&self) -> bool {
+        self.filed.iter().any(|filed| filed.changes.is_some())
+    }
+
+    /// Checks the number of orders that the airplane at a place says that it has carried out.
+    ///
+    /// # Errors
+    /// When it will not be given so many.
+    pub(super) fn check_orders(&self, place: usize, orders: u32) -> Result<(), InvalidMessage> {
+        InvalidMessage::Plan.ensure(orders as usize <= self.filed[place].orders)
     }
 
     /// Returns the air around the airplane at a place.
@@ -273,6 +377,16 @@ impl Ownship {
     fn predictions_from_state(&self, contact: &LastKnownState, place: usize) -> ActionPredictions {
         let CommonKnowledge { is_shielded, now, .. } = *self.common;
         let frame = self.common.frame(place);
-        contact.presumed_predictions(&self.common.air_around(place), is_shielded, now, frame)
+        let air = self.common.air_around(place);
+        let Some(seen) = self.common.commanded.get(place) else {
+            return contact.presumed_predictions(&air, is_shielded, now, frame);
+        };
+        // Its level and its speed are seen, whether or not it is heard.
+        let mut contact = contact.clone();
+        let to_m = seen.command.level.map_or(seen.altitude_m, |level| level.altitude_m);
+        let levels = &mut contact.beacon.levels;
+        *levels = levels.extended_by_level(seen.altitude_m).extended_by_level(to_m);
+        contact.beacon.v_m_s = seen.command.v_m_s.unwrap_or(contact.beacon.v_m_s);
+        contact.presumed_predictions(&air, is_shielded, now, frame)
     }
 }

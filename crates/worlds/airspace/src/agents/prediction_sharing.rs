@@ -8,7 +8,7 @@ use super::optimizer::{Optimizer, OptimizerStep};
 use super::ownship::Ownship;
 use super::participant::InvalidMessage;
 use super::traffic_state::StateBeacon;
-use super::{ActionChoice, MessageLimits};
+use super::{ActionChoice, MessageLimits, RouteProgress};
 use crate::flight::{KnownAircraft, Point, Prediction};
 use crate::objective::{ActionPredictions, add_pair_costs, own_costs};
 use search::{LocalSearchAgent, SearchMember, SearchPeer, SearchStep};
@@ -64,6 +64,15 @@ pub enum PredictionSharingMessage {
     },
     /// What the local search after the rounds needs.
     Search(SearchMessage),
+    /// The predictions of all the sender's actions, where these change levels or speeds.
+    ChangePredictions {
+        /// Beacon of the sender.
+        beacon: StateBeacon,
+        /// Number of its orders that are carried out.
+        orders: u32,
+        /// The predictions, by action.
+        predictions: Vec<Prediction>,
+    },
 }
 
 /// A member of the group, as an agent knows it.
@@ -150,10 +159,12 @@ impl PredictionSharingAgent {
     fn model_message(&self) -> PredictionSharingMessage {
         let beacon = self.own.beacon.clone();
         if !self.by_model {
-            return PredictionSharingMessage::Predictions {
-                beacon,
-                predictions: self.own.options.predictions.clone(),
-            };
+            let predictions = self.own.options.predictions.clone();
+            if !self.own.options.has_changes() {
+                return PredictionSharingMessage::Predictions { beacon, predictions };
+            }
+            let orders = self.own.known.orders;
+            return PredictionSharingMessage::ChangePredictions { beacon, orders, predictions };
         }
         let KnownAircraft { slot, next, orders, altitude_m, .. } = self.own.known;
         let mission = self.own.mission.clone();
@@ -420,23 +431,20 @@ impl Optimizer for PredictionSharingAgent {
         let member = &mut self.members[from];
         match message {
             PredictionSharingMessage::Predictions { beacon, predictions } => {
-                let StateBeacon { separation_m, levels, .. } = beacon;
-                let frame = self.own.common.frame(from);
-                let common = &self.own.common;
-                let options = ActionPredictions::new(predictions, frame, separation_m, levels)
-                    .with_non_cooperative(
-                        &common.non_cooperative,
-                        &common.objective,
-                        common.air.timing.dtau_s,
-                    )
-                    .with_areas(&common.area_context(), &common.objective, common.air.timing.dtau_s)
-                    .with_deviation_weight(common.deviation_weights[from]);
+                let options = self.own.common.heard_options(from, &beacon, predictions, None);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }
-            PredictionSharingMessage::Model { beacon, next, mission, .. } => {
-                let options =
-                    self.own.common.action_predictions(from, &beacon, &mission, next as usize);
+            PredictionSharingMessage::ChangePredictions { beacon, orders, predictions } => {
+                let common = &self.own.common;
+                let changes = common.action_changes(from, orders, &beacon);
+                let options = common.heard_options(from, &beacon, predictions, changes);
+                member.options.get_or_insert(options);
+                member.beacon = Some(beacon);
+            }
+            PredictionSharingMessage::Model { beacon, next, mission, orders, .. } => {
+                let progress = RouteProgress { mission: &mission, next: next as usize, orders };
+                let options = self.own.common.action_predictions(from, &beacon, progress);
                 member.options.get_or_insert(options);
                 member.beacon = Some(beacon);
             }

@@ -6,7 +6,7 @@ use super::participant::InvalidMessage;
 use super::traffic_state::StateBeacon;
 use super::{ActionChoice, MessageLimits};
 use crate::flight::{FlightLevelRange, PairPlane, Prediction};
-use crate::objective::{ActionPredictions, own_costs};
+use crate::objective::{ActionChanges, ActionPredictions, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::Player;
 use std::collections::BTreeMap;
@@ -16,16 +16,7 @@ use std::collections::BTreeMap;
 pub enum SamplingMessage {
     /// Lines 6 to 9: the predictions of the round's samples, and how far the sender's
     /// probabilities have moved in the round before.
-    Predictions {
-        /// Number of the round, from 0.
-        round: u32,
-        /// Largest change of the probabilities.
-        change: f64,
-        /// Beacon of the sender.
-        beacon: StateBeacon,
-        /// The predictions, by sample.
-        predictions: Vec<Prediction>,
-    },
+    Predictions(DrawnPredictions),
     /// Line 17: the sender's part of the cost of each joint sample (eq. 11).
     Costs {
         /// Number of the round, from 0.
@@ -33,6 +24,28 @@ pub enum SamplingMessage {
         /// The costs, by sample.
         costs: Vec<f64>,
     },
+    /// Predictions, where actions change levels or speeds.
+    ChangePredictions {
+        /// The same as of all others.
+        drawn: DrawnPredictions,
+        /// Number of the sender's orders that are carried out.
+        orders: u32,
+        /// The drawn actions, by sample.
+        actions: Vec<u16>,
+    },
+}
+
+/// The predictions of the samples of a round.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct DrawnPredictions {
+    /// Number of the round, from 0.
+    pub round: u32,
+    /// Largest change of the probabilities.
+    pub change: f64,
+    /// Beacon of the sender.
+    pub beacon: StateBeacon,
+    /// The predictions, by sample.
+    pub predictions: Vec<Prediction>,
 }
 
 /// A member of the group, as an agent knows it.
@@ -41,6 +54,10 @@ struct SamplingMember {
     beacon: Option<StateBeacon>,
     /// The predictions of its samples, by round.
     predictions: BTreeMap<u32, Vec<Prediction>>,
+    /// The altitudes and the speeds that its actions lead to, if they change them.
+    action_changes: Option<ActionChanges>,
+    /// Its drawn actions, by round, if they change levels or speeds.
+    actions: BTreeMap<u32, Vec<u16>>,
     /// Its changes of probabilities in the round before, by round.
     changes: BTreeMap<u32, f64>,
     /// Its part of the costs, by round.
@@ -50,6 +67,13 @@ struct SamplingMember {
 }
 
 impl SamplingMember {
+    fn receive(&mut self, drawn: DrawnPredictions) {
+        let DrawnPredictions { round, change, beacon, predictions } = drawn;
+        self.beacon = Some(beacon);
+        self.changes.insert(round, change);
+        self.predictions.insert(round, predictions);
+    }
+
     fn is_gone(&self) -> bool {
         self.presumed.is_some()
     }
@@ -64,11 +88,21 @@ impl SamplingMember {
         heard.or_else(|| Some(self.presumed.as_ref()?.levels))
     }
 
+    /// Returns the levels of its sample in one step of a round.
+    fn step_levels(&self, round: u32, k: usize, step: usize) -> Option<FlightLevelRange> {
+        let actions = self.actions.get(&round).zip(self.action_changes.as_ref());
+        match actions {
+            Some((actions, changes)) => Some(changes.step_levels(actions[k].into(), step)),
+            None => self.levels(),
+        }
+    }
+
     /// Drops old rounds. The predictions of the round before are kept, because they may be the last ones
     /// heard.
     fn forget_before(&mut self, round: u32) {
         self.predictions.retain(|r, _| *r + 1 >= round);
         self.changes.retain(|r, _| *r >= round);
+        self.actions.retain(|r, _| *r >= round);
         self.costs.retain(|r, _| *r >= round);
     }
 }
@@ -112,16 +146,29 @@ impl SamplingAgent {
     fn build_predictions_message(&mut self) -> SamplingMessage {
         self.samples = self.own.samples(&self.player, self.total_sample_count(), self.block);
         let predictions = self.samples.iter().map(|&x| self.own.options.predictions[x].clone());
-        SamplingMessage::Predictions {
+        let drawn = DrawnPredictions {
             round: self.round,
             change: self.change,
             beacon: self.own.beacon.clone(),
             predictions: predictions.collect(),
+        };
+        if !self.own.options.has_changes() {
+            return SamplingMessage::Predictions(drawn);
         }
+        let actions = self.samples.iter().map(|&x| x as u16).collect();
+        SamplingMessage::ChangePredictions { drawn, orders: self.own.known.orders, actions }
     }
 
     fn others(&self) -> impl Iterator<Item = (usize, &SamplingMember)> {
         self.members.iter().enumerate().filter(|(j, _)| *j != self.own.me)
+    }
+
+    /// Checks the predictions that the agent at a place has drawn.
+    fn check_drawn(&self, from: usize, drawn: &DrawnPredictions) -> Result<(), InvalidMessage> {
+        let common = &*self.own.common;
+        common.check_round(drawn.round, drawn.change)?;
+        common.check_beacon(from, &drawn.beacon)?;
+        common.check_predictions(&drawn.predictions, self.block)
     }
 
     /// Returns whether its own costs of this round are sent.
@@ -154,6 +201,7 @@ impl SamplingAgent {
         let options = &self.own.options;
         let x = self.samples[k];
         let prediction = &options.predictions[x];
+        let has_changes = self.own.common.has_changes();
         let mut cost = self.own_costs[x];
         for (place, member) in self.others() {
             let is_on_level = member
@@ -164,7 +212,14 @@ impl SamplingAgent {
                 let other_separation_m = presumed.map_or(0.0, |options| options.separation_m);
                 let r = options.separation_m.max(other_separation_m);
                 let plane = PairPlane::between(options.frame, self.own.common.frame(place));
-                cost += objective.collision_costs(&plane, prediction, other, [r, r])[0];
+                let meets = |step: usize| {
+                    !has_changes
+                        || member.step_levels(self.round, k, step).is_none_or(|levels| {
+                            options.step_levels(x, step).overlaps(&levels, objective.vertical_m)
+                        })
+                };
+                let pair = [prediction, other];
+                cost += objective.collision_costs_where(&plane, pair, [r, r], meets)[0];
             }
         }
         cost
@@ -203,10 +258,18 @@ impl Optimizer for SamplingAgent {
     fn check_message(&self, from: usize, message: &SamplingMessage) -> Result<(), InvalidMessage> {
         let common = &*self.own.common;
         match message {
-            SamplingMessage::Predictions { round, change, beacon, predictions } => {
-                common.check_round(*round, *change)?;
-                common.check_beacon(from, beacon)?;
-                common.check_predictions(predictions, self.block)
+            SamplingMessage::Predictions(drawn) => {
+                InvalidMessage::Kind.ensure(common.filed[from].changes.is_none())?;
+                self.check_drawn(from, drawn)
+            }
+            SamplingMessage::ChangePredictions { drawn, orders, actions } => {
+                let filed = &common.filed[from];
+                InvalidMessage::Kind.ensure(filed.changes.is_some())?;
+                common.check_orders(from, *orders)?;
+                InvalidMessage::Length.ensure(actions.len() == self.block)?;
+                let is_action = |x: &u16| usize::from(*x) < filed.actions.len();
+                InvalidMessage::Number.ensure(actions.iter().all(is_action))?;
+                self.check_drawn(from, drawn)
             }
             SamplingMessage::Costs { round, costs } => {
                 common.check_round(*round, 0.0)?;
@@ -218,7 +281,8 @@ impl Optimizer for SamplingAgent {
     }
 
     fn message_limits(&self) -> MessageLimits {
-        let bytes = self.own.common.max_message_bytes(self.block) + 8 * self.block;
+        // The number of an action takes at most 3.
+        let bytes = self.own.common.max_message_bytes(self.block) + (8 + 3) * self.block;
         // The predictions of its samples and their costs in each round.
         let rounds = self.own.settings().stop.max_rounds;
         MessageLimits { bytes, messages: rounds.saturating_add(1).saturating_mul(2) }
@@ -227,10 +291,12 @@ impl Optimizer for SamplingAgent {
     fn receive(&mut self, from: usize, message: SamplingMessage) {
         let member = &mut self.members[from];
         match message {
-            SamplingMessage::Predictions { round, change, beacon, predictions } => {
-                member.beacon = Some(beacon);
-                member.changes.insert(round, change);
-                member.predictions.insert(round, predictions);
+            SamplingMessage::Predictions(drawn) => member.receive(drawn),
+            SamplingMessage::ChangePredictions { drawn, orders, actions } => {
+                let common = &self.own.common;
+                member.action_changes = common.action_changes(from, orders, &drawn.beacon);
+                member.actions.insert(drawn.round, actions);
+                member.receive(drawn);
             }
             SamplingMessage::Costs { round, costs } => {
                 member.costs.insert(round, costs);

@@ -58,6 +58,11 @@ impl ActiveResolutions {
         self.is_overridden = true;
     }
 
+    /// Returns whether it has forgotten the conflicts, and found none since.
+    pub(crate) fn has_forgotten(&self) -> bool {
+        self.is_overridden && self.with.is_empty()
+    }
+
     /// The others, by rising slot.
     pub(crate) fn conflicting_aircraft(&self) -> &[EntitySlot] {
         &self.with

@@ -104,14 +104,6 @@ fn a_product_of_turns_levels_and_speeds_is_optimized_as_one_set() {
 }
 
 #[test]
-fn agents_that_would_have_to_tell_each_other_are_refused_with_a_remedy() {
-    let text = "format = 1\nworld = \"airspace\"\n[airspace]\ndeployment = \"team\"\n\
-                [airspace.generator]\nkind = \"superconflict\"\nn = 3\n[airplane]\nlevel_changes_m = [300.0]\n";
-    let error = airspace_run(&Source::new("s", text, ""), 1).expect_err("no team does").to_string();
-    assert!(error.contains("leave level_changes_m and speed_changes_m_s out"), "{error}");
-}
-
-#[test]
 fn a_change_that_leaves_no_speed_is_refused() {
     let text = "format = 1\nworld = \"airspace\"\n[airspace.generator]\nkind = \"superconflict\"\nn = 3\n\
                 [airplane]\nspeed_changes_m_s = [-35.0]\n";

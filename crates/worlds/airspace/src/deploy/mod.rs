@@ -18,6 +18,8 @@
 //! faults of the scenario ([`sidestep_kernel::network`]).
 
 #[cfg(test)]
+mod command_tests;
+#[cfg(test)]
 mod conversation_tests;
 mod group;
 #[cfg(test)]

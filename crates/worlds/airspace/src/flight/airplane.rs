@@ -1,7 +1,8 @@
 //! Airplanes as a scenario gives them, and as their group knows them.
 
 use super::change::ChangeAlternatives;
-use super::command::{CommandKinds, LevelCommand, MethodCommand};
+use super::command::{CommandKinds, CommandLimits, LevelCommand, MethodCommand};
+use super::levels::FlightLevelRange;
 use super::motion::{AircraftModel, Point, Pose2};
 use super::order::{FlightOrder, FlightTask};
 use super::performance::Performance;
@@ -117,6 +118,23 @@ impl AirplaneStart {
         let limits_m_s = self.commanded_speeds_m_s;
         let v_m_s = command.v_m_s.zip(limits_m_s);
         MethodCommand { level, v_m_s: v_m_s.map(|(v_m_s, [from, to])| v_m_s.clamp(from, to)) }
+    }
+
+    /// Returns the commands of some kinds that may be in force for it.
+    pub(crate) fn command_limits(&self, kinds: CommandKinds) -> CommandLimits {
+        let Performance { floor_m, ceiling_m, .. } = self.performance;
+        let ordered = self.orders.iter().filter_map(|order| match order.task {
+            FlightTask::Altitude { altitude_m, .. } => Some(altitude_m),
+            _ => None,
+        });
+        let flyable = FlightLevelRange { low_m: floor_m, high_m: ceiling_m };
+        // A filed level may be beyond its limits, and it goes back to it.
+        let filed = ordered.chain([self.altitude_m]);
+        let levels = filed.fold(flyable, FlightLevelRange::extended_by_level);
+        let speeds_m_s = self
+            .planned_speeds_m_s()
+            .fold([f64::INFINITY, 0.0], |[low, high], v_m_s| [low.min(v_m_s), high.max(v_m_s)]);
+        CommandLimits { kinds, levels, speeds_m_s }
     }
 
     /// Returns its model with the turn rate that it can fly at any of its planned speeds.

@@ -3,6 +3,8 @@
 use super::command::{LevelCommand, MethodCommand};
 use super::levels::FlightLevelRange;
 use super::performance::Performance;
+use super::segment::InterOrderSegment;
+use crate::flight_plan::CLIMB_M_S;
 use serde::{Deserialize, Serialize};
 
 /// A change of level and speed beside the filed flight, kept for the whole horizon: the parts of an action beside its
@@ -90,6 +92,26 @@ impl SteadyChange {
     }
 }
 
+/// The level and the speed of a filed flight after some orders.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FiledLevelSpeed {
+    /// Altitude of the level in meters.
+    pub altitude_m: f64,
+    /// Rate of climb to it in meters per second, 0 if it is not climbed to.
+    pub climb_m_s: f64,
+    /// Rate of descent to it in meters per second, 0 if it is not descended to.
+    pub descent_m_s: f64,
+    /// Airspeed in meters per second.
+    pub v_m_s: f64,
+}
+
+impl From<&InterOrderSegment<'_>> for FiledLevelSpeed {
+    fn from(segment: &InterOrderSegment<'_>) -> Self {
+        let &InterOrderSegment { altitude_m, climb_m_s, descent_m_s, ref model, .. } = segment;
+        Self { altitude_m, climb_m_s, descent_m_s, v_m_s: model.v_m_s }
+    }
+}
+
 /// What an airplane flies now, and would fly by its filed flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ChangeableFlight<'a> {
@@ -109,6 +131,28 @@ pub(crate) struct ChangeableFlight<'a> {
     pub(crate) filed_v_m_s: f64,
     /// The limits that it keeps to.
     pub(crate) performance: &'a Performance,
+}
+
+impl<'a> ChangeableFlight<'a> {
+    /// Returns the flight of an airplane that is at an altitude in meters.
+    pub(crate) fn new(
+        filed: FiledLevelSpeed,
+        performance: &'a Performance,
+        altitude_m: f64,
+        v_m_s: f64,
+    ) -> Self {
+        Self {
+            altitude_m,
+            filed_altitude_m: filed.altitude_m,
+            climb_m_s: CLIMB_M_S.min(performance.climb_max_m_s),
+            filed_climb_m_s: filed.climb_m_s,
+            descent_m_s: CLIMB_M_S.min(performance.descent_max_m_s),
+            filed_descent_m_s: filed.descent_m_s,
+            v_m_s,
+            filed_v_m_s: filed.v_m_s,
+            performance,
+        }
+    }
 }
 
 impl ChangeableFlight<'_> {

@@ -5,7 +5,9 @@
 //! is *in force*, and overlays the segment of the filed flight, so that all that is computed from the segment, from
 //! predictions to fallbacks, is about the level and the speed that are really flown.
 
+use super::levels::FlightLevelRange;
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::EntityId;
 use std::ops::RangeInclusive;
 
 /// What a method commands of an airplane beside where to turn; what is none is flown as filed.
@@ -65,6 +67,13 @@ impl CommandKinds {
         *self == Self::NONE
     }
 
+    /// Returns whether a command is of these kinds, and consists of numbers that an airplane can be given.
+    pub(crate) fn allows(&self, command: &MethodCommand) -> bool {
+        let is_of_kind = (self.levels || command.level.is_none())
+            && (self.speeds.is_some() || command.v_m_s.is_none());
+        is_of_kind && command.is_valid()
+    }
+
     /// Returns what one of two methods may command.
     #[must_use]
     pub(crate) fn or(self, other: Self) -> Self {
@@ -76,6 +85,37 @@ impl CommandKinds {
             (one, two) => one.or(two),
         };
         Self { levels: self.levels || other.levels, speeds }
+    }
+}
+
+/// The commands that may be in force for an airplane: those within its limits, and those that lead it back to what is
+/// filed. Messages that say another one lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandLimits {
+    /// What its method may command at all.
+    pub(crate) kinds: CommandKinds,
+    /// The levels.
+    pub(crate) levels: FlightLevelRange,
+    /// The smallest and the largest airspeed, in meters per second.
+    pub(crate) speeds_m_s: [f64; 2],
+}
+
+impl CommandLimits {
+    /// Returns whether a command may be in force for an airplane; `all` are the limits by id, none where no method
+    /// commands anything.
+    pub(crate) fn allow(all: &[Self], id: EntityId, command: &MethodCommand) -> bool {
+        command.is_none() || all.get(id as usize).is_some_and(|limits| limits.allows(command))
+    }
+
+    /// Returns whether a command may be in force.
+    fn allows(&self, command: &MethodCommand) -> bool {
+        let FlightLevelRange { low_m, high_m } = self.levels;
+        let [from_m_s, to_m_s] = self.speeds_m_s;
+        // NaN is in no range.
+        let is_level = |altitude_m: f64| (low_m..=high_m).contains(&altitude_m);
+        self.kinds.allows(command)
+            && command.level.is_none_or(|level| is_level(level.altitude_m))
+            && command.v_m_s.is_none_or(|v_m_s| (from_m_s..=to_m_s).contains(&v_m_s))
     }
 }
 

@@ -3,7 +3,9 @@
 use super::percept::{OwnshipState, Percept, SurveillanceReport, TrackedState, priority_rank};
 use crate::agents::exchange::{ObservedAircraft, ShieldExchangeSetup};
 use crate::agents::traffic_state::{LastKnownState, OrbitState, StateBeacon, TrafficPicture};
-use crate::agents::{CommonKnowledge, FiledFlight, Ownship};
+use crate::agents::{
+    CommandedFlight, CommonKnowledge, FiledChanges, FiledFlight, Ownship, RouteProgress,
+};
 use crate::flight::{FlightLevelRange, KnownAircraft, MethodCommand, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{CommonPlan, Fallback, OrbitSide, PlanCertainty, ShieldedAircraft};
@@ -33,6 +35,7 @@ pub(super) fn common_knowledge(
         streams: world.streams,
         non_cooperative: percept.non_cooperative.iter().cloned().chain(straight).collect(),
         areas: Arc::clone(&world.areas),
+        commanded: commanded_flights(world, percept),
         is_shielded: world.shield,
         deviation_weights: world.deviation_weights(&group),
     })
@@ -50,15 +53,28 @@ pub(super) fn ownship(
     let beacon = beacon(world, known);
     let mission = world.known_segment(known).mission;
     let me = percept.own_place();
+    let progress = RouteProgress { mission, next: known.next, orders: known.orders };
     Ownship {
         me,
         known,
-        options: common.action_predictions(me, &beacon, mission, known.next),
+        options: common.action_predictions(me, &beacon, progress),
         beacon,
         mission: mission.to_vec(),
         contacts: contacts.clone(),
         common,
     }
+}
+
+/// Returns what all see of the levels and the speeds of a group; nothing where no method commands any.
+fn commanded_flights(world: &AirspaceWorld, percept: &Percept) -> Vec<CommandedFlight> {
+    if !world.has_commands() {
+        return Vec::new();
+    }
+    let flight = |one: &SurveillanceReport| CommandedFlight {
+        altitude_m: one.altitude_m,
+        command: one.command,
+    };
+    percept.group.iter().map(flight).collect()
 }
 
 /// Returns what all know of a flight before the run.
@@ -74,12 +90,29 @@ pub(super) fn filed_flight(world: &AirspaceWorld, id: EntityId) -> FiledFlight {
         max_speed_m_s: world.top_m_s[id as usize],
         max_way_points,
         orders,
+        changes: filed_changes(world, id),
     }
+}
+
+/// Returns what an airplane's actions change beside its turns, as it is filed.
+fn filed_changes(world: &AirspaceWorld, id: EntityId) -> Option<FiledChanges> {
+    let airplane = &world.airplanes[id as usize];
+    let has_changes = !world.changes.is_none() && !airplane.changes.is_empty();
+    has_changes.then(|| FiledChanges {
+        performance: airplane.performance.clone(),
+        filed: world.filed_levels_speeds(id),
+    })
 }
 
 /// Returns the message in which an airplane describes itself.
 pub(super) fn beacon(world: &AirspaceWorld, known: KnownAircraft) -> StateBeacon {
     let segment = world.known_segment(known);
+    // One that is not heard for long is known by its last beacon, and may have gone all the way by then.
+    let levels = if world.network.is_some() {
+        FlightLevelRange::between(known.altitude_m, segment.altitude_m)
+    } else {
+        world.levels(known)
+    };
     StateBeacon {
         pose: known.pose,
         goal: segment.mission.get(known.next).copied(),
@@ -87,12 +120,7 @@ pub(super) fn beacon(world: &AirspaceWorld, known: KnownAircraft) -> StateBeacon
         omega_max_rad_s: segment.model.omega_max_rad_s,
         orbit_rad_s: world.orbit_rad_s[known.slot as usize],
         separation_m: segment.model.separation_m,
-        // One that is not heard for long is known by its last beacon, and may have gone all the way by then.
-        levels: if world.network.is_some() {
-            FlightLevelRange::between(known.altitude_m, segment.altitude_m)
-        } else {
-            world.levels(known)
-        },
+        levels: world.levels_with_changes(known, levels),
     }
 }
 
@@ -178,7 +206,7 @@ pub(super) fn shield_exchange_setup(
 }
 
 /// Returns another airplane as the shield of one that perceives it knows it from its visible state and its filed flight:
-/// where messages get lost, no order changes its speed or its level.
+/// where messages get lost, no order changes its speed or its level, and commands that are in force are seen.
 fn shielded_aircraft_from_report(
     world: &AirspaceWorld,
     percept: &Percept,
@@ -215,7 +243,7 @@ fn shielded_aircraft_seen(
     one: &SurveillanceReport,
     exempt: Vec<EntityId>,
 ) -> ShieldedAircraft {
-    let segment = world.segment(one.id, 0);
+    let segment = world.flown_segment(one.id, 0, &one.command);
     let fallback = match one.tracked {
         Some(TrackedState { fallback, .. }) => fallback,
         // The side of one that flies a profile is not visible; the exchange tries both.
@@ -249,7 +277,7 @@ pub(super) fn unheard_as_non_cooperative(
     world: &AirspaceWorld,
     one: &SurveillanceReport,
 ) -> NonCooperativeAircraft {
-    let segment = world.segment(one.id, 0);
+    let segment = world.flown_segment(one.id, 0, &one.command);
     let v_m_s = segment.model.v_m_s;
     let Pose2 { at, heading_rad } = one.pose;
     NonCooperativeAircraft {

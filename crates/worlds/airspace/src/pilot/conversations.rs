@@ -147,6 +147,7 @@ pub(super) fn grouping_participant(
         non_cooperative: percept.non_cooperative.clone(),
         expected: expected_members(percept, contacts),
         airplanes: world.airplanes.len(),
+        command_limits: Arc::clone(&world.command_limits),
         surface: world.surface,
         range_m: network.map_or(f64::INFINITY, |network| network.range_m),
         certainty: plan_certainty(world),

@@ -61,6 +61,8 @@ pub struct OwnshipState {
     pub orders: u32,
     /// The command of its method that is in force.
     pub command: MethodCommand,
+    /// Whether its method has to forget the conflicts that it resolves, because the shield has not cleared a command of it.
+    pub is_overridden: bool,
     /// Its stored fallback, which it may fly at any time.
     pub fallback: Fallback,
     /// Number of times that the shield has refused its preferred action.
@@ -161,8 +163,8 @@ impl Percept {
         InvalidMessage::Airplane.ensure(are_known && is_ascending && is_member)?;
         InvalidMessage::Plan
             .ensure(orders as usize <= world.airplanes[id as usize].orders.len())?;
-        // Pilots are refused where a method commands anything.
-        InvalidMessage::Plan.ensure(command.is_none())?;
+        let are_flown = self.group.iter().all(|one| world.allows_command(one.id, &one.command));
+        InvalidMessage::Plan.ensure(are_flown && world.allows_command(id, &command))?;
         let has_levels = levels.low_m <= altitude_m && altitude_m <= levels.high_m;
         InvalidMessage::Number
             .ensure(has_levels && levels.high_m - levels.low_m < f64::INFINITY)?;

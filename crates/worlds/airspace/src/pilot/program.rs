@@ -125,6 +125,9 @@ impl Pilot {
             self.keep_ended(conversation);
         }
         self.out.clear_waiting();
+        if percept.own.is_overridden {
+            self.memory.resolving.record_override();
+        }
         let control =
             AirplaneControl::stay_on_orbit(self.id, percept.cycle, PilotMemory::default());
         self.state = Some(PilotCycleState {

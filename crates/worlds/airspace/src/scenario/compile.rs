@@ -92,7 +92,6 @@ impl<'a> Compiler<'a> {
     pub(super) fn compile(&self) -> Result<CompiledAirspace, InputError> {
         let mut world = self.world()?;
         self.check_deployment(&world)?;
-        self.check_commands(&world)?;
         self.check_action_set_sizes(&world)?;
         self.check_heading_noise(&world)?;
         let first = first_fallbacks_of(&world);
@@ -223,6 +222,7 @@ impl<'a> Compiler<'a> {
             actions: Arc::default(),
             later: Arc::default(),
             orbit_rad_s: Arc::default(),
+            command_limits: Arc::default(),
             top_m_s: Arc::default(),
             alone_s: Arc::default(),
             alone_efforts: Arc::default(),
@@ -283,30 +283,6 @@ impl<'a> Compiler<'a> {
             }
         }
         kinds
-    }
-
-    /// Refuses methods that command levels or speeds where agents decide, which do not tell each other of these.
-    fn check_commands(&self, world: &AirspaceWorld) -> Result<(), InputError> {
-        if world.command_kinds().is_none() {
-            return Ok(());
-        }
-        let name = world.method.name();
-        if world.deployment != Deployment::Direct {
-            let cause = format!(
-                "method {name} commands levels or speeds, and agents (deployment {}) do not tell each other of these",
-                world.deployment.name()
-            );
-            let remedy = format!("set deployment = \"direct\", or {}", without_commands(world));
-            return Err(self.source.error(None, cause, remedy));
-        }
-        if world.network.is_some() {
-            let cause = format!(
-                "method {name} commands levels or speeds, which nobody sees over a network that loses messages"
-            );
-            let remedy = format!("leave out [airspace.network], or {}", without_commands(world));
-            return Err(self.source.error(None, cause, remedy));
-        }
-        Ok(())
     }
 
     fn method(&self) -> Result<MethodKind, InputError> {
@@ -617,13 +593,4 @@ fn first_fallbacks_of(world: &AirspaceWorld) -> FirstFallbacks {
     let too_close =
         chosen.too_close.into_iter().map(|(i, j)| (starts[i] as u32, starts[j] as u32)).collect();
     FirstFallbacks { fallbacks, too_close, unproved_pairs: chosen.unproved.len() as u64 }
-}
-
-/// Returns the remedy that lets a method command neither levels nor speeds.
-fn without_commands(world: &AirspaceWorld) -> &'static str {
-    match world.method {
-        MethodKind::Mvp => "set mvp = { resolution = \"heading\" }",
-        MethodKind::Own(_) => "take a method that commands neither",
-        _ => "leave level_changes_m and speed_changes_m_s out",
-    }
 }

@@ -35,6 +35,12 @@ impl AirspaceState {
         put_memories(&self.commands, &[slot], vec![command]);
     }
 
+    /// Returns whether the method of an airplane has forgotten the conflicts that it resolved, because of an override.
+    pub(crate) fn is_overridden(&self, slot: EntitySlot) -> bool {
+        let resolving = self.resolving.get(slot as usize);
+        resolving.is_some_and(|resolving| lock(resolving).has_forgotten())
+    }
+
     /// Lets the method of an airplane know that its command was not cleared.
     pub(crate) fn record_command_override(&self, slot: EntitySlot) {
         if let Some(resolving) = self.resolving.get(slot as usize) {

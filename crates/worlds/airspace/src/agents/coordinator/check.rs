@@ -97,6 +97,7 @@ fn check_member(
     let are_numbers = own_costs.iter().all(|cost| cost.is_finite());
     let is_level = levels.low_m <= levels.high_m && samples.iter().all(|&x| x < actions);
     InvalidMessage::Number.ensure(is_player && is_wide && are_numbers && is_level)?;
+    common.check_orders(*place, airplane.orders)?;
     beacon.as_ref().map_or(Ok(()), |beacon| common.check_beacon(*place, beacon))?;
     airplane.decided.as_ref().map_or(Ok(()), |one| check_choice(one, actions))
 }

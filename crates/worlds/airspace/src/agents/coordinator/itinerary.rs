@@ -254,11 +254,17 @@ impl MigratingCoordinator for Coordinator {
             task: if is_above { CoordinatorTask::Collect(0) } else { CoordinatorTask::Gather(0) },
             data: OptimizationProgress { airplanes, ..OptimizationProgress::default() },
             hierarchy: is_above.then(RootCoordinatorData::default),
+            has_changes: services.own.common.has_changes(),
         }
     }
 
     fn encode(&self) -> Vec<u8> {
-        to_bytes(self)
+        let mut bytes = to_bytes(self);
+        if self.has_changes {
+            let airplanes = self.data.airplanes.iter();
+            bytes.extend(to_bytes(&airplanes.map(|one| one.orders).collect::<Vec<u32>>()));
+        }
+        bytes
     }
 
     fn decode(
@@ -267,7 +273,16 @@ impl MigratingCoordinator for Coordinator {
         number: usize,
     ) -> Result<Self, InvalidMessage> {
         let read = postcard::take_from_bytes::<Self>(bytes);
-        let (state, rest) = read.map_err(|_| InvalidMessage::Form)?;
+        let (mut state, mut rest) = read.map_err(|_| InvalidMessage::Form)?;
+        state.has_changes = services.own.common.has_changes();
+        if state.has_changes {
+            let read = postcard::take_from_bytes::<Vec<u32>>(rest);
+            let (orders, end) = read.map_err(|_| InvalidMessage::Form)?;
+            let airplanes = &mut state.data.airplanes;
+            InvalidMessage::Length.ensure(orders.len() == airplanes.len())?;
+            airplanes.iter_mut().zip(orders).for_each(|(one, orders)| one.orders = orders);
+            rest = end;
+        }
         InvalidMessage::Form.ensure(rest.is_empty())?;
         check::check_state(&state, services, number)?;
         Ok(state)

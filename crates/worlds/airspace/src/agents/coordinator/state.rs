@@ -5,7 +5,7 @@ use super::epoch::CoordinatorEpoch;
 use crate::agents::traffic_state::StateBeacon;
 use crate::agents::{ActionChoice, CommonKnowledge, Ownship, ReachedCost};
 use crate::flight::{FlightLevelRange, PairPlane, Prediction};
-use crate::objective::{ActionPredictions, add_pair_costs, own_costs};
+use crate::objective::{ActionChanges, ActionPredictions, add_pair_costs, own_costs};
 use serde::{Deserialize, Serialize};
 use sidestep_collectives::{Estimator, PairwiseGame, Player, optimize};
 use sidestep_kernel::interrupt;
@@ -28,6 +28,9 @@ pub(super) struct CoordinatorMemberData {
     /// Whether it could not be reached, so that its only prediction is presumed.
     pub is_presumed: bool,
     pub decided: Option<ActionChoice>,
+    /// Number of its orders that are carried out. It is sent only where actions change levels or speeds, after all else.
+    #[serde(skip)]
+    pub orders: u32,
 }
 
 /// The data of the algorithm up to its present round; with exact expectations one step makes all rounds.
@@ -76,6 +79,9 @@ pub(super) struct Coordinator {
     pub data: OptimizationProgress,
     /// Present only in the coordinator above others.
     pub hierarchy: Option<RootCoordinatorData>,
+    /// Whether actions of the group change levels or speeds, which all know.
+    #[serde(skip)]
+    pub has_changes: bool,
 }
 
 /// Returns the number of samples in a round; `None` where expectations are exact.
@@ -96,6 +102,7 @@ impl CoordinatorMemberData {
     pub(super) fn update_from_ownship(&mut self, host: &Ownship, round: u32) {
         let options = &host.options;
         self.is_presumed = false;
+        self.orders = host.known.orders;
         self.beacon = Some(host.beacon.clone());
         self.separation_m = options.separation_m;
         self.levels = options.levels;
@@ -122,6 +129,24 @@ impl CoordinatorMemberData {
         self.predictions = vec![options.predictions[0].clone(); predictions];
         self.own_costs = vec![0.0; predictions];
         self.samples.clear();
+    }
+
+    /// Returns the altitudes and the speeds that its actions lead to; none where they are turns alone, and where it is
+    /// presumed.
+    fn action_changes(&self, common: &CommonKnowledge) -> Option<ActionChanges> {
+        let beacon = self.beacon.as_ref().filter(|_| !self.is_presumed)?;
+        common.action_changes(self.place, self.orders, beacon)
+    }
+
+    /// Returns its options, where all actions are compared.
+    fn options(&self, common: &CommonKnowledge) -> ActionPredictions {
+        let frame = common.frame(self.place);
+        let predictions = self.predictions.clone();
+        let options = ActionPredictions::new(predictions, frame, self.separation_m, self.levels);
+        match self.action_changes(common) {
+            Some(changes) => options.with_changes(changes),
+            None => options,
+        }
     }
 
     /// Drops the predictions and the results of samples, which are no longer needed after a round: they would travel
@@ -151,14 +176,8 @@ impl OptimizationProgress {
 
     /// Makes all rounds with exact expectations.
     fn optimize(&mut self, common: &CommonKnowledge) {
-        let all: Vec<ActionPredictions> = self
-            .airplanes
-            .iter()
-            .map(|a| {
-                let frame = common.frame(a.place);
-                ActionPredictions::new(a.predictions.clone(), frame, a.separation_m, a.levels)
-            })
-            .collect();
+        let all: Vec<ActionPredictions> =
+            self.airplanes.iter().map(|airplane| airplane.options(common)).collect();
         let own = self.airplanes.iter().map(|airplane| airplane.own_costs.clone()).collect();
         let mut game = PairwiseGame::new(own);
         for i in 0..all.len() {
@@ -214,9 +233,10 @@ impl OptimizationProgress {
     /// else, and updates every player. Returns the largest change of a probability.
     fn learn_from_samples(&mut self, common: &CommonKnowledge, block: usize, ageing: f64) -> f64 {
         let mut total = Vec::with_capacity(block);
+        let levels = SampleLevels::new(&self.airplanes, common);
         for k in 0..block {
-            let parts =
-                (0..self.airplanes.len()).map(|i| self.airplane_cost_in_sample(common, i, k));
+            let parts = (0..self.airplanes.len())
+                .map(|i| self.airplane_cost_in_sample(common, &levels, i, k));
             total.push(parts.fold(0.0, |sum, part| sum + part));
         }
         let settings = common.settings;
@@ -235,11 +255,17 @@ impl OptimizationProgress {
     }
 
     /// Returns the part of an airplane in the cost of the joint sample `k`.
-    fn airplane_cost_in_sample(&self, common: &CommonKnowledge, i: usize, k: usize) -> f64 {
+    fn airplane_cost_in_sample(
+        &self,
+        common: &CommonKnowledge,
+        levels: &SampleLevels,
+        i: usize,
+        k: usize,
+    ) -> f64 {
         let objective = &common.objective;
         let own = &self.airplanes[i];
         let mut cost = own.own_costs[k];
-        for other in &self.airplanes {
+        for (j, other) in self.airplanes.iter().enumerate() {
             if other.place == own.place || !other.levels.overlaps(&own.levels, objective.vertical_m)
             {
                 continue;
@@ -248,9 +274,43 @@ impl OptimizationProgress {
             let other_separation_m = if other.is_presumed { other.separation_m } else { 0.0 };
             let r = own.separation_m.max(other_separation_m);
             let plane = PairPlane::between(common.frame(own.place), common.frame(other.place));
-            let [p, q] = [own, other].map(|one| &one.predictions[k]);
-            cost += objective.collision_costs(&plane, p, q, [r, r])[0];
+            let pair = [own, other].map(|one| &one.predictions[k]);
+            let meets = |step: usize| {
+                let [own, other] = [i, j].map(|i| levels.of_step(&self.airplanes[i], (i, k), step));
+                own.overlaps(&other, objective.vertical_m)
+            };
+            let meets = |step: usize| levels.are_constant || meets(step);
+            cost += objective.collision_costs_where(&plane, pair, [r, r], meets)[0];
         }
         cost
+    }
+}
+
+/// The levels of samples, where actions change them.
+struct SampleLevels {
+    /// Whether no action changes any.
+    are_constant: bool,
+    /// The altitudes that the actions of each airplane lead to; none of one whose actions are turns alone.
+    changes: Vec<Option<ActionChanges>>,
+}
+
+impl SampleLevels {
+    fn new(airplanes: &[CoordinatorMemberData], common: &CommonKnowledge) -> Self {
+        let are_constant = !common.has_changes();
+        let changing = airplanes.iter().filter(|_| !are_constant);
+        Self { are_constant, changes: changing.map(|one| one.action_changes(common)).collect() }
+    }
+
+    /// Returns the levels of the airplane number `i` in a step of its sample `k`.
+    fn of_step(
+        &self,
+        airplane: &CoordinatorMemberData,
+        (i, k): (usize, usize),
+        step: usize,
+    ) -> FlightLevelRange {
+        match (&self.changes[i], airplane.samples.get(k)) {
+            (Some(changes), Some(&action)) => changes.step_levels(action, step),
+            _ => airplane.levels,
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::agents::intent::Intent;
 use crate::agents::participant::{InvalidMessage, are_valid_coordinates};
-use crate::flight::{KnownAircraft, MethodCommand, Pose2};
+use crate::flight::{CommandLimits, KnownAircraft, MethodCommand, Pose2};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::shield::{Fallback, OrbitSide};
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,7 @@ const MAX_HEADING_RAD: f64 = 1e6;
 
 /// An airplane as others see it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "WireReport", into = "WireReport")]
 pub struct SurveillanceReport {
     /// Id of the airplane that is seen.
     pub id: EntityId,
@@ -25,6 +26,57 @@ pub struct SurveillanceReport {
     /// What all know who have watched it from its start; none after a plan that only those know who have heard it, and
     /// where airplanes have no common plans.
     pub tracked: Option<TrackedState>,
+    /// The level and the speed that its method commands and that are in force, as transponders send the selected altitude
+    /// and the airspeed.
+    pub command: MethodCommand,
+}
+
+/// A report as it is sent: without a command it takes no byte more than it would if there were none.
+#[derive(Serialize, Deserialize)]
+struct WireReport {
+    id: EntityId,
+    pose: Pose2,
+    altitude_m: f64,
+    orbit: Option<OrbitSide>,
+    more: WireReportEnd,
+}
+
+/// What not every report has.
+#[derive(Serialize, Deserialize)]
+enum WireReportEnd {
+    None,
+    Tracked(TrackedState),
+    Command(MethodCommand),
+    TrackedCommand(TrackedState, MethodCommand),
+}
+
+impl From<SurveillanceReport> for WireReport {
+    fn from(report: SurveillanceReport) -> Self {
+        let SurveillanceReport { id, pose, altitude_m, orbit, tracked, command } = report;
+        let more = match tracked {
+            None if command.is_none() => WireReportEnd::None,
+            None => WireReportEnd::Command(command),
+            Some(tracked) if command.is_none() => WireReportEnd::Tracked(tracked),
+            Some(tracked) => WireReportEnd::TrackedCommand(tracked, command),
+        };
+        Self { id, pose, altitude_m, orbit, more }
+    }
+}
+
+impl From<WireReport> for SurveillanceReport {
+    fn from(WireReport { id, pose, altitude_m, orbit, more }: WireReport) -> Self {
+        let tracked = match more {
+            WireReportEnd::Tracked(tracked) | WireReportEnd::TrackedCommand(tracked, _) => {
+                Some(tracked)
+            }
+            WireReportEnd::None | WireReportEnd::Command(_) => None,
+        };
+        let command = match more {
+            WireReportEnd::Command(command) | WireReportEnd::TrackedCommand(_, command) => command,
+            WireReportEnd::None | WireReportEnd::Tracked(_) => MethodCommand::NONE,
+        };
+        Self { id, pose, altitude_m, orbit, tracked, command }
+    }
 }
 
 /// The part of an airplane's state that follows from its flight up to now and from its filed flight.
@@ -39,15 +91,8 @@ pub struct TrackedState {
 impl SurveillanceReport {
     /// Returns the knowledge of it before it has sent anything: its filed flight, where it is seen.
     pub(crate) fn as_known_aircraft(&self) -> KnownAircraft {
-        let &Self { id, pose, altitude_m, .. } = self;
-        KnownAircraft {
-            slot: id,
-            pose,
-            next: 0,
-            orders: 0,
-            altitude_m,
-            command: MethodCommand::NONE,
-        }
+        let &Self { id, pose, altitude_m, command, .. } = self;
+        KnownAircraft { slot: id, pose, next: 0, orders: 0, altitude_m, command }
     }
 
     /// Returns the knowledge of it of those that have watched its flight.
@@ -65,8 +110,7 @@ impl SurveillanceReport {
             next: next as usize,
             orders,
             altitude_m,
-            // Deployments by agents are refused with methods that command anything.
-            command: MethodCommand::NONE,
+            command: self.command,
         }
     }
 }
@@ -105,8 +149,12 @@ impl GroupingMessageItem {
         }
     }
 
-    /// Checks its content, in a world of `airplanes` airplanes.
-    pub(super) fn check(&self, airplanes: usize) -> Result<(), InvalidMessage> {
+    /// Checks its content, in a world of `airplanes` airplanes for which commands within some limits may be in force.
+    pub(super) fn check(
+        &self,
+        airplanes: usize,
+        limits: &[CommandLimits],
+    ) -> Result<(), InvalidMessage> {
         let list = match self {
             Self::Beacon(beacon) => &beacon.near,
             Self::Report { heard, .. } => heard,
@@ -117,16 +165,17 @@ impl GroupingMessageItem {
         InvalidMessage::Airplane
             .ensure(is_known(self.subject_id()) && is_ascending && are_others)?;
         match self {
-            Self::Beacon(beacon) => beacon.check(airplanes),
+            Self::Beacon(beacon) => beacon.check(airplanes, limits),
             Self::Report { .. } => Ok(()),
         }
     }
 }
 
 impl Beacon {
-    fn check(&self, airplanes: usize) -> Result<(), InvalidMessage> {
-        let SurveillanceReport { pose: Pose2 { at: [x, y], heading_rad }, altitude_m, .. } =
-            self.own;
+    fn check(&self, airplanes: usize, limits: &[CommandLimits]) -> Result<(), InvalidMessage> {
+        let SurveillanceReport { id, pose, altitude_m, command, .. } = self.own;
+        let Pose2 { at: [x, y], heading_rad } = pose;
+        InvalidMessage::Plan.ensure(CommandLimits::allow(limits, id, &command))?;
         InvalidMessage::Number.ensure(heading_rad.abs() < MAX_HEADING_RAD)?;
         InvalidMessage::Number.ensure(are_valid_coordinates([x, y, altitude_m]))?;
         let is_ascending = self.non_cooperative.windows(2).all(|pair| pair[0].slot < pair[1].slot);
@@ -139,6 +188,7 @@ impl Beacon {
 
 /// Returns the largest number of bytes of an item in a world of `airplanes` airplanes.
 pub(super) fn max_item_bytes(airplanes: usize) -> usize {
-    // For each other airplane its id of at most 5 bytes, and perhaps its observed flight of at most 96.
-    64 + airplanes * (5 + 96)
+    // For each other airplane its id of at most 5 bytes, and perhaps its observed flight of at most 96; a command of its own
+    // of at most 27.
+    96 + airplanes * (5 + 96)
 }

@@ -1,12 +1,13 @@
 //! Agents that look for their groups, over links of which some never carry anything.
 
 use super::*;
-use crate::flight::{Pose2, Surface};
+use crate::flight::{MethodCommand, Pose2, Surface};
 use crate::shield::OrbitSide;
 use link::ProtocolAgent as _;
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
+use std::sync::Arc;
 
 /// Pairs that are near each other, and those of them that hear each other.
 struct Links {
@@ -50,6 +51,7 @@ impl Links {
             near: near.into_iter().map(sighted).collect(),
             non_cooperative: Vec::new(),
             airplanes: 100,
+            command_limits: Arc::default(),
             surface: Surface::Plane,
             range_m: f64::INFINITY,
             certainty,
@@ -70,6 +72,7 @@ fn sighted(place: usize) -> SurveillanceReport {
         altitude_m: 0.0,
         orbit: (place == 1).then_some(OrbitSide::Left),
         tracked: None,
+        command: MethodCommand::NONE,
     }
 }
 

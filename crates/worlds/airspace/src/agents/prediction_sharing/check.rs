@@ -17,8 +17,14 @@ impl PredictionSharingAgent {
         let actions = filed.actions.len();
         match message {
             PredictionSharingMessage::Predictions { beacon, predictions } => {
-                InvalidMessage::Kind.ensure(!self.by_model)?;
+                InvalidMessage::Kind.ensure(!self.by_model && filed.changes.is_none())?;
                 common.check_beacon(from, beacon)?;
+                common.check_predictions(predictions, actions)
+            }
+            PredictionSharingMessage::ChangePredictions { beacon, orders, predictions } => {
+                InvalidMessage::Kind.ensure(!self.by_model && filed.changes.is_some())?;
+                common.check_beacon(from, beacon)?;
+                common.check_orders(from, *orders)?;
                 common.check_predictions(predictions, actions)
             }
             PredictionSharingMessage::Model {
@@ -34,7 +40,7 @@ impl PredictionSharingAgent {
                 common.check_beacon(from, beacon)?;
                 let is_short = mission.len() <= filed.max_way_points;
                 InvalidMessage::Length.ensure(is_short && *next as usize <= mission.len())?;
-                InvalidMessage::Plan.ensure(*orders as usize <= filed.orders)?;
+                common.check_orders(from, *orders)?;
                 let coordinates_m = mission.as_flattened().iter().chain([altitude_m]);
                 InvalidMessage::Number.ensure(are_valid_coordinates(coordinates_m.copied()))
             }

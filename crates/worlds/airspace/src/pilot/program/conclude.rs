@@ -13,7 +13,7 @@ use crate::decide::{
     candidates_from_choice, decide_by_predictions,
 };
 use crate::events::{Event, EventKind, search_limit};
-use crate::flight::KnownAircraft;
+use crate::flight::{KnownAircraft, MethodCommand};
 use crate::pilot::common_knowledge::{beacon, ownship, unheard_as_non_cooperative};
 use crate::pilot::control::{Maneuver, OptimizationStatus};
 use crate::pilot::conversations::ConversationOutcome;
@@ -77,6 +77,7 @@ impl Pilot {
     /// Stores its candidates; without the shield it flies the first of them.
     fn set_candidates(&mut self, candidates: ManeuverCandidates) {
         let Some(state) = &mut self.state else { return };
+        self.memory.command = candidates.command;
         state.candidates = candidates;
         state.phase = PilotCyclePhase::Decided;
         if !self.world.shield {
@@ -227,7 +228,9 @@ impl Pilot {
             }
             group.push(one.with_intent(intent));
             let resolving = intent.resolving.clone();
-            memory.push(ReactiveMemory { resolving, ..ReactiveMemory::default() });
+            // What others have wished changes nothing: all see what of it is in force.
+            let command = if one.id == self.id { self.memory.command } else { MethodCommand::NONE };
+            memory.push(ReactiveMemory { resolving, command });
         }
         let now = state.percept.cycle;
         let mut all =

@@ -71,6 +71,27 @@ fn a_run_flown_from_outside_is_the_run_that_flies_itself() {
     is_flown_alike("deployment = \"team\"\nshield = \"off\"", FOUR, |_| {});
 }
 
+/// Commands that are not cleared, which the airspace alone decides, pilots learn from their percepts.
+#[test]
+fn a_run_in_which_levels_and_speeds_are_commanded_is_flown_alike_from_outside() {
+    let mvp = |resolution: &str| {
+        format!("method = \"mvp\"\nmvp = {{ resolution = \"{resolution}\", vertical_lead_s = 40 }}")
+    };
+    let faults =
+        "network = { loss = 0.3, max_delay_s = 0.005, silent = [{ airplane = 2, from_s = 20.0 }] }";
+    for resolution in ["speed", "vertical", "heading-speed-vertical"] {
+        let airspace = format!("deployment = \"team\"\n{}", mvp(resolution));
+        is_flown_alike(&airspace, TROUBLE, |_| {});
+        is_flown_alike(&format!("{airspace}\n{faults}"), FOUR, |_| {});
+    }
+    let changes = "[airplane]\nlevel_changes_m = [-310.0, 310.0]\nspeed_changes_m_s = [-5.0]\n";
+    for deployment in ["team", "pim"] {
+        let airspace = format!("deployment = \"{deployment}\"\nlevel_weight = 0.01");
+        is_flown_alike(&airspace, &format!("{changes}{TROUBLE}"), |_| {});
+        is_flown_alike(&format!("{airspace}\n{faults}"), &format!("{changes}{FOUR}"), |_| {});
+    }
+}
+
 #[test]
 fn over_a_network_that_loses_messages_it_is_the_same_run_too() {
     let faults = "network = { loss = 0.2, duplication = 0.1, max_delay_s = 0.005, range_m = 6000.0, \
@@ -208,7 +229,12 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
         fallback: crate::shield::Fallback::after_straight(100, crate::shield::OrbitSide::Left),
         is_common: false,
     };
-    let wrong: [(Vec<AirplaneControl>, &str); 8] = [
+    let commanded = crate::flight::MethodCommand { level: None, v_m_s: Some(36.0) };
+    let wrong: [(Vec<AirplaneControl>, &str); 9] = [
+        (
+            changed(&|control| control.memory.command = commanded),
+            "its memory or its optimization are impossible",
+        ),
         (changed(&|control| control.id = 9), "it does not decide in this cycle"),
         (changed(&|control| control.cycle = 3), "give that of airplane 1 and cycle 0"),
         (changed(&|control| control.maneuver = profile(vec![0.0; 4])), "give 5, one for each step"),

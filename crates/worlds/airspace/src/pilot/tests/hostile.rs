@@ -27,6 +27,27 @@ const KINDS: [&str; 14] = [
     "deployment = \"compact-team\"\ngroups = \"heard\"\nnetwork = { loss = 0.2 }",
 ];
 
+/// The same where methods command levels and speeds.
+const COMMANDING: [&str; 6] = [
+    "deployment = \"team\"\nmethod = \"mvp\"\nmvp = { resolution = \"heading-speed-vertical\" }",
+    "deployment = \"team\"\ngroups = \"heard\"\nmethod = \"mvp\"\nmvp = { resolution = \"vertical\" }\n\
+     network = { loss = 0.2 }",
+    "deployment = \"team\"",
+    "deployment = \"compact-team\"\ngroups = \"heard\"\nnetwork = { loss = 0.2 }",
+    "deployment = \"team\"\npreset = \"paper\"",
+    "deployment = \"hierarchical-pim\"\npreset = \"paper\"\nnetwork = { loss = 0.2 }",
+];
+
+/// Returns a run of three that meet; by the larger numbers methods command levels and speeds, which are in force already.
+fn run_of_kind(kind: usize) -> AirspaceRun {
+    let Some(commanding) = kind.checked_sub(KINDS.len()) else { return run(KINDS[kind], THREE) };
+    let changes =
+        "[airplane]\nturns = 3\nlevel_changes_m = [-310.0, 310.0]\nspeed_changes_m_s = [-5.0]\n";
+    let mut run = run(COMMANDING[commanding], &format!("{changes}{THREE}"));
+    run.advance(4);
+    run
+}
+
 /// Changes some bytes, or cuts some off, or adds some.
 fn changed(bytes: &[u8], draws: &mut Draws) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
@@ -116,10 +137,10 @@ proptest! {
     /// Damaged on the way, or meant for others: only the real messages count.
     #[test]
     fn what_is_damaged_or_misplaced_is_counted_and_changes_nothing(
-        seed in any::<u64>(), kind in 0..KINDS.len(), is_damaged in any::<bool>(),
+        seed in any::<u64>(), kind in 0..KINDS.len() + COMMANDING.len(), is_damaged in any::<bool>(),
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(902));
-        let run = run(KINDS[kind], THREE);
+        let run = run_of_kind(kind);
         let mut alone = TestPilots::from_run(&run);
         let mut disturbed = TestPilots::from_run(&run);
         run_with_extra_packets(&run, &mut alone.pilots, <[u8]>::to_vec);
@@ -146,10 +167,10 @@ proptest! {
     /// Well formed, with right checksums, and senseless or lying: no pilot breaks off.
     #[test]
     fn whatever_a_packet_says_nobody_breaks_off(
-        seed in any::<u64>(), kind in 0..KINDS.len(), is_only in any::<bool>(),
+        seed in any::<u64>(), kind in 0..KINDS.len() + COMMANDING.len(), is_only in any::<bool>(),
     ) {
         let mut draws = Streams::new(Seed(seed)).draws(0, 0, Purpose(903));
-        let run = run(KINDS[kind], THREE);
+        let run = run_of_kind(kind);
         let mut all = TestPilots::from_run(&run);
         let mut real = Vec::new();
         run_with_extra_packets(&run, &mut all.pilots, |payload| {
@@ -173,6 +194,49 @@ proptest! {
             all.pilots[percept.own.id as usize].start(percept, 1);
         }
     }
+}
+
+/// A percept may come over a network, and a beacon of one that is not seen, too.
+#[test]
+fn commands_beyond_the_limits_of_an_airplane_are_refused() {
+    use crate::flight::{LevelCommand, MethodCommand};
+    let limited = format!("[airplane]\nceiling_m = 2000.0\nv_max_m_s = 40.0\n{THREE}");
+    let airspace = |resolution: &str| {
+        let mvp = format!("mvp = {{ resolution = \"{resolution}\" }}");
+        format!("deployment = \"team\"\nmethod = \"mvp\"\n{mvp}")
+    };
+    let level = |altitude_m: f64, vertical_m_s: f64| MethodCommand {
+        level: Some(LevelCommand { altitude_m, vertical_m_s }),
+        v_m_s: None,
+    };
+    let speed = |v_m_s: f64| MethodCommand { level: None, v_m_s: Some(v_m_s) };
+    let all = run(&airspace("heading-speed-vertical"), &limited);
+    let speeds = run(&airspace("speed"), &limited);
+    let none = run(&airspace("heading"), &limited);
+    let right = [level(1500.0, 5.0), speed(38.0), MethodCommand::NONE];
+    let wrong = [
+        level(2000.5, 5.0),
+        level(f64::NAN, 5.0),
+        level(f64::NEG_INFINITY, 5.0),
+        level(1500.0, -1.0),
+        level(1500.0, f64::INFINITY),
+        speed(40.5),
+        speed(1.0),
+        speed(f64::NAN),
+    ];
+    let is_taken = |run: &AirspaceRun, command: MethodCommand| {
+        let mut percept = run.percepts().swap_remove(0);
+        percept.group[1].command = command;
+        let of_other = percept.check(run.world()).is_ok();
+        let mut percept = run.percepts().swap_remove(0);
+        percept.own.command = command;
+        assert_eq!(percept.check(run.world()).is_ok(), of_other, "{command:?}");
+        of_other
+    };
+    assert!(right.iter().all(|command| is_taken(&all, *command)));
+    assert!(wrong.iter().all(|command| !is_taken(&all, *command)));
+    assert!(is_taken(&speeds, speed(38.0)) && !is_taken(&speeds, level(1500.0, 5.0)));
+    assert!(!is_taken(&none, speed(35.0)) && !is_taken(&none, level(0.0, 5.0)));
 }
 
 #[test]
