@@ -235,6 +235,20 @@ fn processes_come_out_as_one_process_does_and_leave_an_ordinary_folder() {
 
 /// All deployments, with and without faults.
 #[test]
+fn processes_come_out_as_one_process_does_where_levels_and_speeds_are_commanded() {
+    let mvp = "method = \"mvp\"\nmvp = { resolution = \"heading-speed-vertical\" }\nnetwork = { loss = 0.1 }";
+    let text = superconflict(3, "team", 20, mvp);
+    let folder = folder(&text);
+    let job = job(folder.path(), Topology::Star, ClockMode::Lockstep);
+    let program = LinkProcess::start(&Job::Fleet(job));
+    let (summary, _) = program.complete();
+    let one = run_in_one_process(&text);
+    assert_eq!(summary["digest"], one.digest);
+    assert_eq!(untimed(summary["metrics"].clone()), one.metrics);
+    assert!(one.metrics["commands_held"].is_u64(), "{}", one.metrics);
+}
+
+#[test]
 #[ignore = "minutes of processor time: eight whole flights of ten airplanes"]
 fn a_whole_super_conflict_of_ten_comes_out_as_in_one_process_in_every_deployment() {
     for deployment in ["team", "compact-team", "pim", "hierarchical-pim"] {

@@ -57,6 +57,19 @@ fn threads_come_out_as_one_process_does_in_every_deployment() {
     }
 }
 
+/// Levels and speeds are commanded, some of them not cleared, and messages lost.
+#[test]
+fn threads_come_out_as_one_process_does_where_levels_and_speeds_are_commanded() {
+    let mvp = "method = \"mvp\"\nmvp = { resolution = \"heading-speed-vertical\" }";
+    for (deployment, network) in [("team", ""), ("replica-team", BAD_NETWORK)] {
+        let text = superconflict(4, deployment, 20, &format!("{mvp}\n{network}"));
+        assert_eq!(run_over_memory(&text), run_in_one_process(&text), "{deployment}");
+        let tuples = superconflict(4, deployment, 12, &format!("level_weight = 0.01\n{network}"))
+            + "[airplane]\nlevel_changes_m = [-310.0, 310.0]\nspeed_changes_m_s = [-5.0]\n";
+        assert_eq!(run_over_memory(&tuples), run_in_one_process(&tuples), "{deployment}");
+    }
+}
+
 /// A wire at which frames of different senders arrive in an order of its own, some of them later than they could: as where
 /// a machine gives its time to others.
 struct LoadedWire {

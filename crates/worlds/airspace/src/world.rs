@@ -207,7 +207,6 @@ impl AirspaceWorld {
             self.actions = Arc::clone(&known.actions);
             self.orbit_rad_s = Arc::clone(&known.orbit_rad_s);
             self.top_m_s = Arc::clone(&known.top_m_s);
-            self.command_limits = Arc::clone(&known.command_limits);
         } else {
             self.actions = Arc::new(
                 self.airplanes
@@ -219,8 +218,8 @@ impl AirspaceWorld {
             );
             self.orbit_rad_s = Arc::new(self.orbits_rad_s());
             self.top_m_s = Arc::new(self.map_airplanes(Self::max_speed_m_s));
-            self.command_limits = self.limits_of_commands();
         }
+        self.command_limits = self.limits_of_commands();
         self.fallbacks =
             Arc::new((0..self.airplanes.len()).map(|i| self.fallback_choices(i)).collect());
         self.curvature_m = self.curvature_error_m();

@@ -2,7 +2,8 @@
 //!
 //! With the shield they are cleared as orders are. A speed is flown only when the airplane then has a fallback apart from
 //! all stored ones; a level is taken up at once, and the way to it cleared in stages (`levels.rs`). So the invariant
-//! holds whatever a method commands. What is not cleared the method is told as an override, and the airplane keeps the
+//! holds whatever a method commands. Over a network that may lose messages that must be the stored fallback, with which
+//! others reckon. What is not cleared the method is told as an override, and the airplane keeps the
 //! speed and the level that it has.
 
 use super::orders::fallback_at_speed;

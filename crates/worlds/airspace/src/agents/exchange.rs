@@ -26,8 +26,8 @@
 //! cannot follow from anything that was heard: the other may not know that the one has heard it, and both might
 //! believe that they go first.
 //!
-//! Airplanes nearby can be seen, heard or not: their position, whether they are on their fallback, and the
-//! side to which they then turn. Not visible are the candidates of an airplane, and the fallback of one
+//! Airplanes nearby can be seen, heard or not: their position, the level and the speed that their methods command and that
+//! are in force, whether they are on their fallback, and the side to which they then turn. Not visible are the candidates of an airplane, and the fallback of one
 //! that flies a profile, unless that is its common plan. So what an unheard airplane may fly is: the fallback on which it is
 //! seen, or with which its common plan has ended; or, if it flew another plan, the orbit at the end of the one that was
 //! heard of it in the exchange before; or else both orbits from where it is seen. One whose fallback is not known to all
@@ -46,6 +46,12 @@
 //! all that it may fly itself. So the two keep apart in every case, during `dt` and on
 //! the fallbacks after it. Each knows the fallback on which the other is after that, or has heard it as
 //! the end of the other's only plan; where it has not, both orbits count as possible.
+//!
+//! *Commands of methods* change speeds and levels at the start of a cycle, before all see each other. One is cleared only if
+//! the airplane's stored fallback, flown at the new speed and on all levels that it passes in the cycle, keeps apart from the
+//! stored ones of all others (`act/commands.rs`, `act/levels.rs`); no other fallback is stored for it. So the fallbacks
+//! that the two are on keep apart, and what each knows of the other's side stays true. An airplane that is not heard counts
+//! on all levels from its own to the one that it changes to, which are more than it passes.
 //!
 //! Nothing in this depends on why an airplane is not heard, or for how long: a radio that is off, a
 //! partition, a unidirectional link, a burst of losses, or an airplane that has

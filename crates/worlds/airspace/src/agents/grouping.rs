@@ -6,8 +6,8 @@
 //! the airplanes find their group in a conversation of its own:
 //!
 //! 1. Each sends its *beacon* to those near it: where all see it (place, heading, altitude, whether it is on its
-//!    orbit), the airplanes that it sees near it, and the non-cooperative ones near it. Its speed and its abilities
-//!    are in the filed plan.
+//!    orbit, and the command of its method that is in force), the airplanes that it sees near it, and the
+//!    non-cooperative ones near it. Its filed speed and its abilities are in the filed plan.
 //! 2. When the beacons of all near have come, or those that are missing were requested so often that their senders
 //!    can hardly be reached, it *reports* the airplanes that it has heard. It reports once, and so all information
 //!    about it in a cycle is two items, each of which is known or not: there are no versions of an item, and an old

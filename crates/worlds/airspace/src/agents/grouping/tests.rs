@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::flight::{MethodCommand, Pose2, Surface};
-use crate::shield::OrbitSide;
+use crate::shield::{Fallback, OrbitSide};
 use link::ProtocolAgent as _;
 use proptest::prelude::*;
 use sidestep_kernel::Seed;
@@ -236,4 +236,22 @@ fn a_beacon_from_where_nobody_sees_its_airplane_is_refused() {
     assert_eq!(altered(|beacon| beacon.near = vec![7, 1]), Err(InvalidMessage::Airplane));
     assert_eq!(altered(|beacon| beacon.near = vec![beacon.own.id]), Err(InvalidMessage::Airplane));
     assert_eq!(agent.check_message(1, &Vec::new()), Err(InvalidMessage::Length));
+}
+
+#[test]
+fn a_report_takes_bytes_for_a_command_only_where_one_is_in_force() {
+    let plain = sighted(1);
+    let bytes = postcard::to_stdvec(&plain).expect("plain data");
+    let SurveillanceReport { id, pose, altitude_m, orbit, tracked, .. } = plain;
+    let without = postcard::to_stdvec(&(id, pose, altitude_m, orbit, tracked)).expect("plain data");
+    assert_eq!(bytes, without);
+    let tracked = TrackedState { next: 3, fallback: Fallback::from_side(OrbitSide::Right) };
+    let command = MethodCommand { level: None, v_m_s: Some(31.0) };
+    for tracked in [None, Some(tracked)] {
+        for command in [MethodCommand::NONE, command] {
+            let report = SurveillanceReport { tracked, command, ..plain };
+            let bytes = postcard::to_stdvec(&report).expect("plain data");
+            assert_eq!(postcard::from_bytes(&bytes), Ok(report));
+        }
+    }
 }
