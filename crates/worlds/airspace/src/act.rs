@@ -105,7 +105,7 @@ pub(super) fn prepare_decisions(
     levels::keep_levels(context, group);
     if context.world.shield {
         entry::release_exempt(context, &flown.ids);
-        let non_cooperative = non_cooperative_aircraft(context, group);
+        let non_cooperative = PerceivedTraffic::non_cooperative_aircraft(context, group);
         entry::assign_fallbacks(context, &flown.ids, &non_cooperative);
         entry::renew_fallbacks(context, &flown.ids);
         areas::report_exempt_areas(context, &flown.ids);
