@@ -9,7 +9,7 @@
 use super::areas::{AreaContext, LocalArea};
 use super::flight::{
     Action, ChangeableFlight, FlightLevelRange, Frame, PairPlane, Point, Prediction, RigidMotion,
-    SteadyChange, TimeDiscretization, distance_m,
+    SteadyChange, Surface, TimeDiscretization, distance_m,
 };
 use super::non_cooperative::NonCooperativeAircraft;
 use serde::{Deserialize, Serialize};
@@ -90,6 +90,12 @@ impl Objective {
             weight = self.next_slice_weight(weight);
         }
         sums
+    }
+
+    /// Returns the distance in meters beyond which two of a separation cost each other nothing.
+    fn gap_m(&self, separation_m: f64) -> f64 {
+        // Slightly more, so that no rounding of bounds leaves out points that add a cost.
+        self.inflation * separation_m * (1.0 + 1e-9)
     }
 
     fn counted_points(&self, prediction: &Prediction) -> usize {
@@ -188,6 +194,8 @@ pub struct ActionPredictions {
     /// Costs of the actions in areas; empty where there are none.
     area_costs: Vec<f64>,
     slices: Vec<TimeSlice>,
+    /// Bounds around the points of all slices.
+    bounds: BoundingBox,
     /// Largest distance of a point from the origin of the frame, in meters.
     reach_m: f64,
 }
@@ -206,6 +214,8 @@ impl ActionPredictions {
             .map(|from| TimeSlice::new(&predictions, from, None))
             .collect();
         let reach_m = slices.iter().map(|slice| slice.all.reach_m()).fold(0.0, f64::max);
+        let corners: Vec<Point> =
+            slices.iter().flat_map(|slice| [slice.all.low, slice.all.high]).collect();
         Self {
             predictions,
             frame,
@@ -216,7 +226,31 @@ impl ActionPredictions {
             non_cooperative_costs: Vec::new(),
             area_costs: Vec::new(),
             slices,
+            bounds: BoundingBox::from_points(&corners),
             reach_m,
+        }
+    }
+
+    /// Returns where the airplane may be by `Surface::sweep_m`, from the least to the most.
+    fn sweep_range_m(&self) -> [f64; 2] {
+        let surface = self.frame.surface();
+        match surface {
+            Surface::Plane => [self.bounds.low[0], self.bounds.high[0]],
+            Surface::Earth => {
+                let origin_m = surface.sweep_m(self.frame.to_world([0.0; 2]));
+                [origin_m - self.reach_m, origin_m + self.reach_m]
+            }
+        }
+    }
+
+    /// Returns no if another airplane is surely farther than `gap_m` meters away, whatever the two do.
+    fn is_in_reach(&self, other: &Self, gap_m: f64) -> bool {
+        match self.frame.surface() {
+            Surface::Plane => self.bounds.is_within_gap(&other.bounds, gap_m),
+            Surface::Earth => {
+                let reach_m = gap_m + self.reach_m + other.reach_m;
+                !self.frame.is_surely_beyond(&other.frame, reach_m)
+            }
         }
     }
 
@@ -490,12 +524,32 @@ impl BoundingBox {
 pub fn build_group_game(objective: &Objective, group: &[ActionPredictions]) -> PairwiseGame {
     let own = group.iter().map(|options| own_costs(objective, options)).collect();
     let mut game = PairwiseGame::new(own);
-    for (i, a) in group.iter().enumerate() {
-        for (j, b) in group.iter().enumerate().skip(i + 1) {
-            add_pair_costs(&mut game, objective, [i, j], [a, b]);
-        }
+    for [i, j] in pairs_in_reach(objective, group) {
+        add_pair_costs(&mut game, objective, [i, j], [&group[i], &group[j]]);
     }
     game
+}
+
+/// Returns the pairs of a group that may come so near to each other that it costs something, in the order of the first
+/// one and then of the second.
+fn pairs_in_reach(objective: &Objective, group: &[ActionPredictions]) -> Vec<[usize; 2]> {
+    // Most airplanes of a large group are far from each other. Sorted by where their reach begins, each is compared with
+    // those alone that begin before its own reach ends.
+    let separation_m = group.iter().map(|options| options.separation_m).fold(0.0, f64::max);
+    let gap_m = objective.gap_m(separation_m);
+    let ranges_m: Vec<[f64; 2]> = group.iter().map(ActionPredictions::sweep_range_m).collect();
+    let mut order: Vec<usize> = (0..group.len()).collect();
+    order.sort_by(|i, j| ranges_m[*i][0].total_cmp(&ranges_m[*j][0]));
+    let mut pairs = Vec::new();
+    for (place, &i) in order.iter().enumerate() {
+        let end_m = ranges_m[i][1] + gap_m;
+        let later = order[place + 1..].iter().take_while(|j| ranges_m[**j][0] <= end_m);
+        let in_reach = later.filter(|j| group[i].is_in_reach(&group[**j], gap_m));
+        pairs.extend(in_reach.map(|&j| [i.min(j), i.max(j)]));
+    }
+    // The order of the game, by which its costs are summed.
+    pairs.sort_unstable();
+    pairs
 }
 
 /// Returns the sum of `alpha Gdev` of every action and its costs beside non-cooperative aircraft and among areas.
@@ -541,9 +595,8 @@ fn pair_costs(
     b: &ActionPredictions,
 ) -> Option<Vec<[f64; 2]>> {
     let r = [a.separation_m, b.separation_m];
-    // Slightly more, so that no rounding of bounds leaves out points that add a cost.
-    let gap_m = objective.inflation * r[0].max(r[1]) * (1.0 + 1e-9);
-    if a.frame.is_surely_beyond(&b.frame, gap_m + a.reach_m + b.reach_m) {
+    let gap_m = objective.gap_m(r[0].max(r[1]));
+    if !a.is_in_reach(b, gap_m) {
         return None;
     }
     let plane = PairPlane::between(a.frame, b.frame);
