@@ -85,11 +85,8 @@ const MEETING: &str = "format = 1\nworld = \"airspace\"\ncycles = 16\n[airspace]
 /// Returns the cycles of the encounters in a folder, and whether each lasts.
 fn encounters(folder: &Path) -> (Vec<u64>, Vec<u32>) {
     let table = read_table(folder, "pairs", ..).unwrap_or_else(|e| panic!("{e}"));
-    let (Some(ColumnValues::U64(cycles)), Some(ColumnValues::Label(open))) =
-        (table.column("cycle"), table.column("open"))
-    else {
-        panic!("columns of pairs")
-    };
+    let Some(ColumnValues::U64(cycles)) = table.column("cycle") else { panic!("cycles") };
+    let Some(ColumnValues::Label(open)) = table.column("open") else { panic!("labels") };
     (cycles.to_vec(), open.to_vec())
 }
 

@@ -200,7 +200,7 @@ pub(crate) fn group_threats(
     }
     let threats = |(aircraft, candidates): (&ShieldedAircraft, &Vec<TurnProfile>)| {
         let avoidance = NonCooperativeAvoidance::new(aircraft, non_cooperative, timing.dtau_s);
-        let fallback = || aircraft.fallback_profile(timing.points_per_dt());
+        let fallback = || TurnProfile::on_fallback(aircraft, timing.points_per_dt());
         avoidance.candidate_threats(candidates, fallback)
     };
     group.iter().zip(candidates).map(threats).collect()

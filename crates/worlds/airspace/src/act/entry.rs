@@ -13,7 +13,7 @@ use crate::flight::TimeDiscretization;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::scratch::PhaseContext;
 use crate::shield::{
-    EntryFallbacks, EntryRole, Fallback, OrbitSide, ShieldedAircraft, entry_fallbacks,
+    EntryFallbacks, EntryRole, Fallback, OrbitSide, ShieldedAircraft, TurnProfile, entry_fallbacks,
     renewed_fallbacks,
 };
 use sidestep_kernel::EntitySlot;
@@ -135,7 +135,7 @@ fn choices_beside(
     }
     let threats = |fallback: Fallback| -> Vec<EntitySlot> {
         let holding = ShieldedAircraft { fallback, ..aircraft.clone() };
-        let profile = holding.fallback_profile(timing.points_per_dt());
+        let profile = TurnProfile::on_fallback(&holding, timing.points_per_dt());
         avoidance.threats(&profile).map(|one| one.slot).collect()
     };
     let present = threats(aircraft.fallback);

@@ -83,7 +83,7 @@ fn common_plans(world: &AirspaceWorld, percept: &Percept) -> Vec<Option<CommonPl
         }
         let avoidance = NonCooperativeAvoidance::new(&seen, non_cooperative, world.timing.dtau_s);
         let wishes = &candidates[place].profiles;
-        let allowed = avoidance.allowed_profiles(wishes, || seen.fallback_profile(steps));
+        let allowed = avoidance.allowed_profiles(wishes, || TurnProfile::on_fallback(&seen, steps));
         profiles.push(allowed.iter().map(|&k| wishes[k].clone()).collect());
         aircraft.push(seen);
         wanted.push(Some(Wishes { place, allowed }));
@@ -103,7 +103,7 @@ fn common_plans(world: &AirspaceWorld, percept: &Percept) -> Vec<Option<CommonPl
         let profile = profiles[k][candidate].clone();
         let candidate = allowed[candidate] as u32;
         // Where it moves as on its fallback, nobody could see which of the two it flies.
-        if profile != aircraft[k].fallback_profile(steps) {
+        if profile != TurnProfile::on_fallback(&aircraft[k], steps) {
             plans[*place] = Some(CommonPlan { candidate, profile, fallback });
         }
     }

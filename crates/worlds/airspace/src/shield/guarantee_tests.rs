@@ -2,6 +2,8 @@
 
 use crate::{AirspaceRun, airspace_run};
 use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::math::hypot;
 use sidestep_scenario::Source;
@@ -326,4 +328,37 @@ proptest! {
         let airplanes = format!("{airplanes}{non_cooperative}");
         only_named_pairs_lose(&erring(sigma_m, sigma_deg, ""), &airplanes)?;
     }
+}
+
+/// Flies the same random traffic among intruders in every build, and tells how many pairs are named in it.
+#[test]
+#[ignore = "six hundred runs: minutes"]
+fn how_many_pairs_are_named_beside_intruders_is_told() {
+    let mut runner = TestRunner::deterministic();
+    let mut totals = [0usize; 4];
+    for _ in 0..600 {
+        let [airplanes, intruders] = [crowd().boxed(), non_cooperative().boxed()]
+            .map(|texts| texts.new_tree(&mut runner).expect("a text").current());
+        let mut run = run("method = \"mvp\"", &format!("{airplanes}{intruders}"));
+        run.advance(120);
+        let (lost, named) = lost_and_named(&run);
+        let avoids_nobody = |id: u32| {
+            let airplane = &run.world().airplanes[id as usize];
+            airplane.track.is_some() || airplane.is_non_cooperative
+        };
+        let is_beside = |&&(a, b): &&(u32, u32)| avoids_nobody(a) != avoids_nobody(b);
+        let is_flown = |&&(a, b): &&(u32, u32)| !avoids_nobody(a) && !avoids_nobody(b);
+        let found = [
+            named.iter().filter(is_beside).count(),
+            named.iter().filter(is_flown).count(),
+            lost.difference(&named).filter(is_beside).count(),
+            lost.difference(&named).filter(is_flown).count(),
+        ];
+        totals.iter_mut().zip(found).for_each(|(total, found)| *total += found);
+    }
+    let [beside, flown, lost_beside, lost] = totals;
+    println!(
+        "named beside intruders {beside}, among others {flown}; lost unnamed {lost_beside}, {lost}"
+    );
+    assert_eq!([lost_beside, lost], [0, 0]);
 }

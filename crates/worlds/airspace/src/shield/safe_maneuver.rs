@@ -17,6 +17,14 @@ pub struct TurnProfile {
     pub omegas_rad_s: Vec<f64>,
 }
 
+impl TurnProfile {
+    /// Returns the profile of an airplane's stored fallback for one `dt`, if no gust takes it off that.
+    pub(crate) fn on_fallback(aircraft: &ShieldedAircraft, steps: usize) -> Self {
+        let omega_rad_s = aircraft.fallback.omega_rad_s(aircraft.orbit_rad_s);
+        Self { omegas_rad_s: vec![omega_rad_s; steps] }
+    }
+}
+
 /// A plan that all airplanes compute for one of them from what all see, so that none has to hear of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CommonPlan {

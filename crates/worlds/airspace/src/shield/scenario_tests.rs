@@ -7,17 +7,18 @@ use sidestep_scenario::Source;
 use std::path::Path;
 
 const METHODS: [&str; 4] = ["pc", "mvp", "orca", "none"];
-/// Shipped scenarios; `departures` is flown by `terminal_tests.rs` as well, and takes the longest.
-const QUICK: [&str; 7] = [
+/// All that are shipped.
+const SCENARIOS: [&str; 9] = [
     "areas",
     "default",
+    "departures",
+    "levels-and-speeds",
     "mixed-types",
     "mvp-speed",
     "mvp-vertical",
     "superconflict",
     "wind-layers",
 ];
-const LONG: [&str; 2] = ["departures", "levels-and-speeds"];
 
 /// Returns the pairs that lose separation in a scenario, and those that are named.
 fn flown(name: &str, settings: &[&str]) -> (Pairs, Pairs) {
@@ -46,7 +47,7 @@ fn assert_pair_by_pair(name: &str, method: &str, seed: u64) -> [usize; 3] {
 
 #[test]
 fn in_shipped_scenarios_only_named_pairs_lose_separation_and_no_others_than_without_the_shield() {
-    for name in QUICK {
+    for name in SCENARIOS {
         for method in METHODS {
             let [_, _, anew] = assert_pair_by_pair(name, method, 1);
             assert_eq!(anew, 0, "{name} {method}");
@@ -55,9 +56,9 @@ fn in_shipped_scenarios_only_named_pairs_lose_separation_and_no_others_than_with
 }
 
 #[test]
-#[ignore = "twenty seeds of all scenarios: minutes"]
+#[ignore = "twenty seeds of all scenarios: a minute"]
 fn in_twenty_seeds_of_shipped_scenarios_only_named_pairs_lose_separation() {
-    for name in QUICK.iter().chain(&LONG) {
+    for name in SCENARIOS {
         for method in METHODS {
             let mut totals = [0; 3];
             for seed in 1..=20 {

@@ -3,7 +3,6 @@
 use super::drift::AirDrift;
 use super::fallback::{Fallback, FallbackPath};
 use super::orbit::{Orbit, OrbitSide};
-use super::safe_maneuver::TurnProfile;
 use crate::areas::LocalAreas;
 use crate::flight::{FlightLevelRange, Frame, PairPlane, Point, Pose2, Surface, distance_m};
 use sidestep_kernel::EntityId;
@@ -71,12 +70,6 @@ impl ShieldedAircraft {
     pub(crate) fn is_safe_with(&self, other: &Self) -> bool {
         !self.is_on_same_level(other)
             || self.do_fallbacks_stay_apart(self.fallback, other, other.fallback)
-    }
-
-    /// Returns the turn profile of its stored fallback for one `dt`, if no gust takes it off that.
-    pub(crate) fn fallback_profile(&self, steps: usize) -> TurnProfile {
-        let omega_rad_s = self.fallback.omega_rad_s(self.orbit_rad_s);
-        TurnProfile { omegas_rad_s: vec![omega_rad_s; steps] }
     }
 
     /// Returns its pose in its frame.
