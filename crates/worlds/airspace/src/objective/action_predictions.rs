@@ -123,7 +123,7 @@ impl ActionPredictions {
     }
 
     /// Returns whether actions change levels or speeds.
-    pub(super) fn has_changes(&self) -> bool {
+    pub(crate) fn has_changes(&self) -> bool {
         self.changes.is_some()
     }
 
