@@ -236,8 +236,8 @@ metrics! {
         /// Times that the shield did not clear a level or a speed that a method commands: the airplane kept its speed for one
         /// `dt`, or leveled off short of a level; none where methods command neither.
         pub commands_held: Option<u64> => "levels and speeds held by the shield",
-        /// Fraction of observations in which the observer had a track, 0 to 1. One is of another airplane near an observer in
-        /// a cycle, if that one does not tell where it is; none without `airspace.surveillance`.
+        /// Fraction of observations in which the observer had a track, 0 to 1; none without `airspace.surveillance`. An
+        /// observation is of another airplane near an observer in a cycle, if that one does not tell where it is.
         pub track_availability: Option<f64> => "availability of tracks",
         /// Mean age of these tracks: the time since the last report. In seconds.
         pub mean_track_age_s: Option<f64> => "mean age of tracks",
