@@ -24,7 +24,7 @@ mod holds;
 mod levels;
 mod orders;
 #[cfg(test)]
-mod performance_tests;
+pub(super) mod performance_tests;
 mod protect;
 mod step;
 

@@ -62,7 +62,7 @@ fn orders(kind: TestType) -> impl Strategy<Value = String> {
 }
 
 /// Airplanes of several types on three levels, with orders of speed and level.
-pub(super) fn mixed_crowd() -> impl Strategy<Value = String> {
+pub(crate) fn mixed_crowd() -> impl Strategy<Value = String> {
     let coordinate = || -3000.0f64..3000.0;
     let one = (0usize..TYPES.len()).prop_flat_map(move |kind| {
         let kind = TYPES[kind];

@@ -3,6 +3,7 @@
 
 use crate::AirspaceRun;
 use crate::act::command_tests::{AtRandom, by_mvp, meeting, run, run_own};
+use crate::act::performance_tests::mixed_crowd;
 use crate::metrics::Metrics;
 use crate::shield::guarantee_tests::{crowd, lost_and_named, plane};
 use proptest::prelude::*;
@@ -43,7 +44,7 @@ fn altitudes_m(run: &AirspaceRun) -> Vec<f64> {
 
 #[test]
 fn every_deployment_chooses_the_same_tuples_of_turns_levels_and_speeds_bit_for_bit() {
-    let keys = "level_changes_m = [-160.0, 160.0]\nspeed_changes_m_s = [-5.0, 5.0]";
+    let keys = "level_changes_m = [-160.0, 160.0]\nspeed_changes_m_s = [-5.0]";
     let paper = "preset = \"paper\"\nmax_rounds = 8\ncombinations = \"none\"";
     let parallel = "order = \"parallel\"\nmax_rounds = 10\ncombinations = \"all\"";
     for settings in ["max_rounds = 10", parallel, paper] {
@@ -51,7 +52,7 @@ fn every_deployment_chooses_the_same_tuples_of_turns_levels_and_speeds_bit_for_b
             let airspace = format!(
                 "deployment = \"{deployment}\"\nvertical_m = 150.0\nlevel_weight = 0.01\n{settings}"
             );
-            flown(run(&airspace, &crossing(keys)), 18)
+            flown(run(&airspace, &crossing(keys)), 14)
         };
         let (direct, alone, farthest_m) = fly("direct");
         assert!(farthest_m > 60.0, "{settings}: {farthest_m}");
@@ -139,7 +140,8 @@ fn network() -> impl Strategy<Value = String> {
 
 /// Airplanes whose orders, which are refused over a network where they change speeds or levels, are left out.
 fn crowd_without_orders() -> impl Strategy<Value = String> {
-    crowd().prop_map(|airplanes| airplanes.replace("orders = [", "# orders = ["))
+    let airplanes = prop_oneof![crowd(), mixed_crowd()];
+    airplanes.prop_map(|airplanes| airplanes.replace("orders = [", "# orders = ["))
 }
 
 fn agents() -> impl Strategy<Value = String> {
@@ -158,7 +160,7 @@ fn only_named_pairs_lose(kind: &str, agents: &str, airplanes: &str) -> Result<()
         "tuples" => {
             let airspace = format!("level_weight = 0.1\nmax_rounds = 10\n{agents}");
             let changes = "[airplane]\nturns = 3\nlevel_changes_m = [-310.0, 150.0]\n\
-                           speed_changes_m_s = [-9.0, 6.0]\nacceleration_m_s2 = 0.8\n";
+                           speed_changes_m_s = [-2.0, 6.0]\nacceleration_m_s2 = 0.8\n";
             run(&airspace, &format!("{changes}{airplanes}"))
         }
         resolution => run(&by_mvp(resolution, agents), airplanes),
