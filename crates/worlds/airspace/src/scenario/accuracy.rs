@@ -207,7 +207,8 @@ mod tests {
         // 95 % of two normal coordinates are within the bound of the category.
         for (slot, bound_m_s) in [(0, 10.0), (1, 1.0), (2, 0.3), (3, 3.0)] {
             let noise_m_s: f64 = world.velocity_noise_m_s(slot);
-            let share = 1.0 - sidestep_kernel::math::exp(-0.5 * (bound_m_s / noise_m_s).powi(2));
+            let deviations = bound_m_s / noise_m_s;
+            let share = 1.0 - sidestep_kernel::math::exp(-0.5 * deviations * deviations);
             assert!((share - 0.95).abs() < 1e-12, "{slot}: {share}");
         }
         let unknown = self::run("", "", &flight(""));

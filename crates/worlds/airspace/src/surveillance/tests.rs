@@ -43,7 +43,7 @@ fn the_share_of_tracks_and_their_ages_are_those_that_the_keys_say() {
         // Four reports are recent enough; the mean of their ages, of those of which one was received.
         (
             "reception_probability = 0.4, coast_s = 3.0",
-            1.0 - 0.6f64.powi(4),
+            1.0 - 0.6 * 0.6 * 0.6 * 0.6,
             (0.24 + 2.0 * 0.144 + 3.0 * 0.0864) / 0.8704,
         ),
     ] {
