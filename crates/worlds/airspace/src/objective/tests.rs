@@ -244,12 +244,12 @@ fn pairs_that_are_left_out_of_a_group_cost_nothing() {
     for surface in [Surface::Plane, Surface::Earth] {
         let options = |i: u32| {
             let draws =
-                philox4x32([i, 0, 0, 0], [7, 0]).map(|draw| f64::from(draw) / 2f64.powi(32));
+                philox4x32([i, 0, 0, 0], [7, 0]).map(|draw| f64::from(draw) / 4_294_967_296.0);
             let [x, y, heading, separation] = draws;
             let heading_rad = std::f64::consts::TAU * heading;
             let [place, start_m] = match surface {
                 Surface::Plane => [[0.0; 2], [20_000.0 * x, 20_000.0 * y]],
-                Surface::Earth => [[6.0 * x, 1.5707 - 0.002 * y], [0.0; 2]],
+                Surface::Earth => [[6.0 * x, std::f64::consts::FRAC_PI_2 - 0.002 * y], [0.0; 2]],
             };
             let after = |k: u32| {
                 let way_m = 35.0 * f64::from(k);
