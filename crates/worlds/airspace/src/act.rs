@@ -109,7 +109,7 @@ pub(super) fn prepare_decisions(
         entry::assign_fallbacks(context, &flown.ids, &non_cooperative);
         entry::renew_fallbacks(context, &flown.ids);
         areas::report_exempt_areas(context, &flown.ids);
-        errors::report_beyond_bound(context, &flown.ids);
+        errors::report_beyond_bound(context, group, &flown.ids);
     }
     commands::hold_speeds(context, group);
     orders::execute_due_orders(context, group, &flown.ids);

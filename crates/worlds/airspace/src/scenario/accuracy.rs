@@ -194,6 +194,19 @@ mod tests {
     }
 
     #[test]
+    fn an_intruder_that_is_farther_off_than_its_radius_of_containment_is_named() {
+        let airplanes = "[[airplanes]]\nat_m = [0, 0]\nheading_deg = 0\nway_points_m = [[9000, 0]]\n\
+                         [[airplanes]]\nat_m = [9000, 200]\nheading_deg = 180\nway_points_m = [[0, 200]]\n\
+                         non_cooperative = true\nnac_p = 7\nnic = 9\n";
+        let mut run = run("method = \"mvp\"", "", airplanes);
+        run.advance(60);
+        let beyond: Vec<_> = run.metrics().beyond_bound.iter().map(|one| one.airplane).collect();
+        assert_eq!(beyond, [1]);
+        let (lost, named) = lost_and_named(&run);
+        assert!(lost.is_subset(&named), "{lost:?} {named:?}");
+    }
+
+    #[test]
     fn velocities_are_reported_as_accurately_as_the_category_of_each_airplane_says() {
         let flight = |more: &str| {
             format!(
