@@ -245,6 +245,6 @@ impl AirspaceWorld {
 
 /// Returns whether pilots report events of this kind; the run itself reports all others.
 fn is_pilot_event(kind: EventKind) -> bool {
-    use EventKind::{Deadline, GroupTooLarge, HeldBack, Unheard};
-    matches!(kind, Deadline | GroupTooLarge | HeldBack | Unheard)
+    use EventKind::{Deadline, GroupTooLarge, HeldBack, SearchLimit, Unheard};
+    matches!(kind, Deadline | GroupTooLarge | HeldBack | SearchLimit | Unheard)
 }

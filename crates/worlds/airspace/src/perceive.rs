@@ -107,14 +107,33 @@ pub(super) fn surveillance_report(
 }
 
 /// Returns a non-cooperative airplane as all see it where they see it in every cycle, at once.
+/// Returns a non-cooperative airplane as all see it.
 pub(super) fn non_cooperative_at(
     context: &PhaseContext<'_>,
     slot: EntitySlot,
 ) -> NonCooperativeAircraft {
     let PhaseContext { world, state, now, .. } = *context;
+    let pose = observed_pose(world, slot, now, state.airplanes[slot as usize].pose());
+    non_cooperative_from_pose(context, slot, pose)
+}
+
+/// Returns a non-cooperative airplane where it is, as the run alone knows it.
+pub(super) fn true_non_cooperative_at(
+    context: &PhaseContext<'_>,
+    slot: EntitySlot,
+) -> NonCooperativeAircraft {
+    let pose = context.state.airplanes[slot as usize].pose();
+    non_cooperative_from_pose(context, slot, pose)
+}
+
+fn non_cooperative_from_pose(
+    context: &PhaseContext<'_>,
+    slot: EntitySlot,
+    Pose2 { at, heading_rad }: Pose2,
+) -> NonCooperativeAircraft {
+    let PhaseContext { world, state, now, .. } = *context;
     let airplane = &world.airplanes[slot as usize];
     let current = &state.airplanes[slot as usize];
-    let Pose2 { at, heading_rad } = observed_pose(world, slot, now, current.pose());
     let [wx, wy] = world.wind_m_s;
     let segment = state.segment(world, slot);
     let along = |speed: f64| [speed * math::cos(heading_rad), speed * math::sin(heading_rad)];

@@ -13,7 +13,7 @@
 //! its right gives way; one that overtakes gives way; of two head-on neither has right of way. Or it follows from phases of
 //! flight, as with `PRIORULES` of BlueSky: those that cruise have right of way over those that climb or descend, or the
 //! other way round, and of two in one phase neither has. It follows from what all see and what is filed, so
-//! all agree on it without a word. `decide/deviation_weights.rs` has the weights of `pc`.
+//! all agree on it without a word, unless each sees others by tracks of its own. `decide/deviation_weights.rs` has the weights of `pc`.
 //!
 //! By phases, the rules of BlueSky 1.1.1 decide on the vertical part of a resolution by `mvp`, too
 //! ([`RightOfWayRule::vertical_share`]). An airplane that has right of way flies its plan here; there it keeps its
@@ -86,10 +86,10 @@ impl RightOfWayRule {
 
     /// Returns the part of the vertical change that resolves a conflict which an airplane flies by `mvp`. In BlueSky it is
     /// half of it, also beside one that has right of way, or nothing; without a rule by phases one flies all of it beside
-    /// another one that does not give way.
+    /// another one that does not give way. Nobody has right of way over one that avoids nobody.
     pub(crate) fn vertical_share(self, own: &AircraftState, other: &AircraftState) -> f64 {
         let share = if other.yields { 0.5 } else { 1.0 };
-        let gives_way = self.yielding(own, other) == Yielding::First;
+        let gives_way = other.is_cooperative && self.yielding(own, other) == Yielding::First;
         match self {
             Self::None | Self::RulesOfTheAir => share,
             Self::CruisingFirst if gives_way => 0.5,
@@ -202,6 +202,20 @@ mod tests {
 
     fn aircraft(slot: EntitySlot, at: [f64; 2], heading_deg: f64) -> AircraftState {
         test_aircraft(slot, at, heading_deg.to_radians())
+    }
+
+    #[test]
+    fn beside_an_airplane_that_avoids_nobody_one_resolves_a_conflict_by_itself_whatever_the_phases()
+    {
+        let own = aircraft(0, [0.0, 0.0], 0.0);
+        let climbing = AircraftState { climb_m_s: 5.0, ..aircraft(1, [4000.0, 0.0], 180.0) };
+        let intruder = AircraftState { yields: false, is_cooperative: false, ..climbing };
+        let rule = RightOfWayRule::ClimbingFirst;
+        assert_eq!(rule.vertical_share(&own, &climbing), 0.0);
+        assert_eq!(rule.vertical_share(&own, &intruder), 1.0);
+        let climbing_own = AircraftState { climb_m_s: 5.0, ..own };
+        let cruising = AircraftState { climb_m_s: 0.0, ..intruder };
+        assert_eq!(RightOfWayRule::CruisingFirst.vertical_share(&climbing_own, &cruising), 1.0);
     }
 
     #[test]

@@ -381,7 +381,8 @@ impl Ownship {
         let Some(seen) = self.common.commanded.get(place) else {
             return contact.presumed_predictions(&air, is_shielded, now, frame);
         };
-        // Its level and its speed are seen, whether or not it is heard.
+        // Its level and a command in force are seen, whether or not it is heard. Its speed by its orders is not: without a
+        // command it is presumed to be that of its last message.
         let mut contact = contact.clone();
         let to_m = seen.command.level.map_or(seen.altitude_m, |level| level.altitude_m);
         let levels = &mut contact.beacon.levels;

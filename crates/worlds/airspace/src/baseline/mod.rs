@@ -44,6 +44,8 @@ pub struct AircraftState {
     pub levels: FlightLevelRange,
     /// Whether it gives way to others, too.
     pub yields: bool,
+    /// Whether it avoids others at all; one that has right of way does, and need not give way.
+    pub is_cooperative: bool,
 }
 
 impl AircraftState {
@@ -72,5 +74,6 @@ pub(crate) fn test_aircraft(slot: EntitySlot, at: Point, heading_rad: f64) -> Ai
         climb_m_s: 0.0,
         levels: FlightLevelRange::from_level(0.0),
         yields: true,
+        is_cooperative: true,
     }
 }

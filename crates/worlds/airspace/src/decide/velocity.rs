@@ -230,11 +230,12 @@ impl<'a> TrafficView<'a> {
     fn yielding(&self, a: usize, b: usize) -> Yielding {
         let [one, other] = [&self.all[a], &self.all[b]];
         // Nobody has right of way over one that avoids nobody.
-        let may_give_way = one.yields && other.yields;
+        let may_give_way = one.is_cooperative && other.is_cooperative;
         if !self.world.uses_right_of_way || !may_give_way {
             return Yielding::Both;
         }
-        // Always as the one with the smaller slot sees it, so that both come to the same.
+        // Always as the one with the smaller slot sees it, so that both come to the same where both see the same. By own
+        // tracks each has its own view of the other, and near the borders of a rule both may find that the other gives way.
         if one.slot < other.slot {
             self.sight(a, b).map_or(Yielding::Both, |seen| self.world.yielding(one, &seen))
         } else {
@@ -455,6 +456,7 @@ pub(crate) fn non_cooperative_state(
         climb_m_s: one.climb_m_s,
         levels: one.levels,
         yields: false,
+        is_cooperative: false,
     }
 }
 
@@ -480,5 +482,6 @@ fn aircraft_state(world: &AirspaceWorld, known: KnownAircraft) -> AircraftState 
         climb_m_s: world.known_segment(known).signed_climb_m_s(known.altitude_m),
         levels: world.levels(known),
         yields: true,
+        is_cooperative: true,
     }
 }

@@ -2,6 +2,8 @@
 
 use super::compile::Compiler;
 use crate::flight::{Point, TimeDiscretization};
+use crate::flight_plan::CLIMB_M_S;
+use crate::method::MethodKind;
 use crate::settings::SurveillanceSettings;
 use crate::world::AirspaceWorld;
 use schemars::JsonSchema;
@@ -14,6 +16,8 @@ use sidestep_scenario::{AboveZero, Closed, LeftOpen, Number};
 
 /// Seconds after which a track is dropped, unless the scenario gives a number.
 const DEFAULT_COAST_S: f64 = 10.0;
+/// Most seconds for which a track may coast.
+const MAX_COAST_S: i64 = 3600;
 /// Reports that a track may miss in a row before it is dropped, unless the scenario says otherwise.
 const DEFAULT_MISSED_REPORTS: f64 = 3.0;
 /// Largest number of past states that are kept of each airplane: the memory of a run grows with it.
@@ -37,7 +41,7 @@ pub(super) struct SurveillanceSection {
     /// Distance beyond which none is received.
     range_m: Option<Number<AboveZero>>,
     /// Age of its last report above which a track is dropped.
-    coast_s: Option<Number<LeftOpen<0, 3600>>>,
+    coast_s: Option<Number<LeftOpen<0, MAX_COAST_S>>>,
     /// Standard deviation of the error of each observer's sensor in each coordinate of a position, beside the error of the
     /// report.
     position_noise_m: Option<Number<Closed<0, 1_000_000>>>,
@@ -93,11 +97,16 @@ impl Compiler<'_> {
         let coast_s = section.coast_s.map_or(DEFAULT_COAST_S.max(missed_s), f64::from);
         let coast_steps = (coast_s / dtau_s + ROUNDING).floor();
         if coast_s < usual_s - ROUNDING {
+            let remedy = if usual_s > MAX_COAST_S as f64 {
+                "give a shorter latency_s or report_interval_s".to_owned()
+            } else {
+                format!("give a coast_s of {usual_s} or more")
+            };
             let cause = format!(
                 "coast_s = {coast_s}, and reports are up to {usual_s} s old: of latency_s in steps of {dtau_s} s, and \
                  report_interval_s"
             );
-            return error(&cause, &format!("give a coast_s of {usual_s} or more"));
+            return error(&cause, &remedy);
         }
         let position_noise_m = section.position_noise_m.map_or(0.0, f64::from);
         let settings = SurveillanceSettings {
@@ -110,13 +119,22 @@ impl Compiler<'_> {
             velocity_noise_m_s: section.velocity_noise_m_s.map_or(0.0, f64::from),
             position_bound_m: self.error_sigmas() * position_noise_m,
             max_wind_change_m_s: 0.0,
+            max_drift_m_s: 0.0,
+            commanded_climb_m_s: None,
         };
         let kept = settings.kept_states(timing.points_per_dt());
         if kept > MAX_KEPT_STATES {
             let cause = format!(
                 "a coast_s of {coast_s} s, in steps of {dtau_s} s: {kept} states of each airplane"
             );
-            return error(&cause, &format!("give up to {MAX_KEPT_STATES} steps"));
+            // A decision looks a cycle farther back than tracks are kept.
+            let max_coast_s = (MAX_KEPT_STATES - timing.points_per_dt()) as f64 * dtau_s;
+            let remedy = if usual_s > max_coast_s {
+                "give a shorter latency_s or report_interval_s, or a larger dtau_s".to_owned()
+            } else {
+                format!("give a coast_s of up to {max_coast_s}, or a larger dtau_s")
+            };
+            return error(&cause, &remedy);
         }
         Ok(Some(settings))
     }
@@ -130,11 +148,11 @@ impl Compiler<'_> {
     ) -> Result<(), InputError> {
         let Some(given) = &self.file.airspace.surveillance else { return Ok(()) };
         let rules = || std::iter::once(&*world).chain(later.iter().map(|(_, world)| world));
-        let is_never_cooperative = |world: &AirspaceWorld| {
+        let has_non_cooperative = |world: &AirspaceWorld| {
             (0..world.airplanes.len())
                 .any(|i| world.is_non_cooperative(i as EntitySlot, Cycle::MAX - 1))
         };
-        if world.gusts.is_some() && rules().any(|rules| rules.shield && is_never_cooperative(rules))
+        if world.gusts.is_some() && rules().any(|rules| rules.shield && has_non_cooperative(rules))
         {
             let cause = "gusts under the shield, beside non-cooperative airplanes that are seen late: nobody knows how far a gust \
                          has carried them since";
@@ -149,16 +167,32 @@ impl Compiler<'_> {
                 max_change_m_s = max_change_m_s.max(norm(sub(wind_m_s, other_m_s)));
             }
         }
+        // A report may be of a time when other rules held.
+        let max_drift_m_s = rules().map(AirspaceWorld::max_drift_m_s).fold(0.0, f64::max);
+        let commanded_climb_m_s = rules().filter_map(commanded_climb_m_s).reduce(f64::max);
         let all = std::iter::once(world).chain(later.iter_mut().map(|(_, world)| world));
         for settings in all.filter_map(|world| world.surveillance.as_mut()) {
             settings.max_wind_change_m_s = max_change_m_s;
+            settings.max_drift_m_s = max_drift_m_s;
+            settings.commanded_climb_m_s = commanded_climb_m_s;
         }
         Ok(())
     }
 }
 
+/// Returns the largest rate at which the method commands an airplane without limits to climb or descend; `None` if it
+/// commands no levels.
+fn commanded_climb_m_s(world: &AirspaceWorld) -> Option<f64> {
+    world.command_kinds().levels.then_some(match &world.method {
+        // Its rates are what the program likes.
+        MethodKind::Own(_) => f64::INFINITY,
+        _ => CLIMB_M_S,
+    })
+}
+
 #[cfg(test)]
 mod tests {
+    use crate::flight_plan::CLIMB_M_S;
     use crate::scenario::CompiledAirspace;
     use sidestep_scenario::Source;
 
@@ -188,7 +222,21 @@ mod tests {
                 "",
                 "give a coast_s of 6 or more",
             ),
-            ("dtau_s = 0.01\nsurveillance = { coast_s = 200.0 }", "", "give up to 10000 steps"),
+            (
+                "dtau_s = 0.01\nsurveillance = { coast_s = 200.0 }",
+                "",
+                "give a coast_s of up to 95, or",
+            ),
+            (
+                "dtau_s = 0.01\nsurveillance = { report_interval_s = 3600.0 }",
+                "",
+                "or a larger dtau_s",
+            ),
+            (
+                "surveillance = { latency_s = 3000.0, report_interval_s = 1000.0, coast_s = 3600.0 }",
+                "",
+                "give a shorter latency_s",
+            ),
             (
                 "deployment = \"team\"\nsurveillance = {}",
                 "[airspace.network]",
@@ -200,6 +248,8 @@ mod tests {
             let error = compiled(airspace, airplanes).map(|_| ()).expect_err(cause);
             assert!(error.contains(cause) && error.contains("help: "), "{airspace}: {error}");
         }
+        let longest = "dtau_s = 0.01\nsurveillance = { coast_s = 95.0 }";
+        assert!(compiled(longest, "").is_ok(), "the remedy works");
         assert!(compiled(gusts, "").is_ok());
         assert!(compiled(&format!("shield = \"off\"\n{gusts}"), silent).is_ok());
     }
@@ -213,6 +263,20 @@ mod tests {
         assert_eq!(coast(""), 10);
         assert_eq!(coast("latency_s = 1.5, report_interval_s = 12.0"), 38);
         assert_eq!(coast("coast_s = 25.9"), 25);
+    }
+
+    /// A report may be of a time before the rules changed.
+    #[test]
+    fn bounds_on_tracks_are_those_of_all_rules() {
+        let rules = "method = \"mvp\"\nmvp = { resolution = \"vertical\" }\nsurveillance = {}\n\
+                     winds = [{ altitude_m = 0.0, wind_m_s = [0.0, 0.0] }, { altitude_m = 900.0, wind_m_s = [8.0, 0.0] }]\n\
+                     changes = [{ at_s = 50.0, method = \"none\" }, { at_s = 60.0, wind_m_s = [4.0, 0.0] }]";
+        let compiled = compiled(rules, "").expect("right");
+        for world in compiled.world.all_rules() {
+            let settings = world.surveillance.expect("given");
+            assert_eq!(settings.commanded_climb_m_s, Some(CLIMB_M_S));
+            assert_eq!(settings.max_drift_m_s, 4.0);
+        }
     }
 
     #[test]

@@ -23,6 +23,11 @@ pub struct SurveillanceSettings {
     pub position_bound_m: f64,
     /// Largest difference of the winds of two rules of the scenario, in meters per second: 0 where the wind never changes.
     pub max_wind_change_m_s: f64,
+    /// Largest speed of any air relative to the common one, by all rules of the scenario, in meters per second.
+    pub max_drift_m_s: f64,
+    /// Largest rate at which a method of any rule commands an airplane without limits to climb or descend, in meters per
+    /// second; none where no method commands levels.
+    pub commanded_climb_m_s: Option<f64>,
 }
 
 impl SurveillanceSettings {

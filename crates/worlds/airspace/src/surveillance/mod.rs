@@ -12,15 +12,17 @@
 //!   (`track.rs`). A track whose report is older than the coast time is dropped: the observer does not see that airplane.
 //!
 //! **Who uses it.** Methods by which each airplane decides by itself from the positions of others (`mvp`, `orca`,
-//! `bands`, a program's own, and callers of method `external`), where no agents send positions to each other. Airplanes
+//! `bands` and a program's own), where no agents send positions to each other; and what callers of
+//! `external` observe. Airplanes
 //! that optimize together tell each other their states, so `pc` and all agents know those of their group exactly, and so
 //! does the shield: its clearances are a link of its own. Of *non-cooperative* airplanes a group knows the latest report
 //! that any of it has received, because its members tell each other that, too.
 //!
 //! **The shield's promise** beside non-cooperative airplanes rests on where they can be ([`crate::avoid`]). The bound on
 //! the error of a track grows with its age `a`: since the report the airplane may have flown `s a` at its greatest speed
-//! `s`, and the track was moved on by `v a` at the reported velocity. So it is within `E + (s + v) a` of its track, where
-//! `E` bounds the errors of the report. One of which nobody in the group has a track cannot be avoided. The run, which
+//! `s` in the common air, which contains the largest drift of any air by any rule of the scenario, and the track was
+//! moved on by `v a` at the reported velocity; where rules change the common wind, that has carried it by up to `w a`
+//! otherwise. So it is within `E + (s + v + w) a` of its track, where `E` bounds the errors of the report. One of which nobody in the group has a track cannot be avoided. The run, which
 //! knows where it is, names each pair with it before that pair may lose separation.
 
 mod observations;

@@ -4,7 +4,7 @@ use super::observations::GroupObservations;
 use super::report_archive::ReportArchive;
 use crate::events::{Event, EventKind};
 use crate::non_cooperative::NonCooperativeAircraft;
-use crate::perceive::non_cooperative_at;
+use crate::perceive::{non_cooperative_at, true_non_cooperative_at};
 use crate::scratch::PhaseContext;
 use sidestep_kernel::EntitySlot;
 
@@ -48,7 +48,7 @@ impl PerceivedTraffic {
             };
             match observations.latest_track(slot) {
                 Some(track) => all.non_cooperative.push(track.non_cooperative_aircraft(world)),
-                None => all.unseen.push(non_cooperative_at(context, slot)),
+                None => all.unseen.push(true_non_cooperative_at(context, slot)),
             }
         }
         all.observations = observations;

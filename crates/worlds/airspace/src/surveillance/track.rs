@@ -2,7 +2,6 @@
 
 use crate::baseline::AircraftState;
 use crate::flight::{FlightLevelRange, Point, Pose2, rotated};
-use crate::flight_plan::CLIMB_M_S;
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::EntitySlot;
@@ -86,6 +85,7 @@ impl SurveillanceTrack {
                 altitude_m + self.climb_m_s * look_ahead_s,
             ),
             yields: true,
+            is_cooperative: true,
         }
     }
 
@@ -123,7 +123,8 @@ impl SurveillanceTrack {
     /// Returns its greatest speed through the common air, in meters per second, wherever and on whatever track it flies.
     fn top_m_s(&self, world: &AirspaceWorld) -> f64 {
         let i = self.slot as usize;
-        let kind_m_s = world.top_m_s[i] + world.max_drift_m_s();
+        let drift_m_s = world.surveillance.map_or(0.0, |settings| settings.max_drift_m_s);
+        let kind_m_s = world.top_m_s[i] + drift_m_s;
         if world.airplanes[i].track.is_some() {
             // Recorded speeds are over the ground.
             return kind_m_s + norm(world.wind_m_s);
@@ -140,11 +141,11 @@ impl SurveillanceTrack {
             let segment = world.segment(self.slot, done as u32);
             max_m_s = max_m_s.max(segment.climb_m_s).max(segment.descent_m_s);
         }
-        if world.has_commands() {
+        let commanded_m_s = world.surveillance.and_then(|settings| settings.commanded_climb_m_s);
+        if let Some(unlimited_m_s) = commanded_m_s {
             let performance = &airplane.performance;
             for limit_m_s in [performance.climb_max_m_s, performance.descent_max_m_s] {
-                // As methods command it where no limit is known.
-                let commanded_m_s = if limit_m_s.is_finite() { limit_m_s } else { CLIMB_M_S };
+                let commanded_m_s = if limit_m_s.is_finite() { limit_m_s } else { unlimited_m_s };
                 max_m_s = max_m_s.max(commanded_m_s);
             }
         }
