@@ -79,13 +79,16 @@ impl<'a> NonCooperativeAvoidance<'a> {
         if self.others.is_empty() {
             return None;
         }
-        let (required, of_fallback) = self.clearance(&fallback());
+        let fallback_result = self.clearance(&fallback());
+        let required = fallback_result.0;
+        let of_fallback = fallback_result.1;
         let full = PathClearance { is_clear: true, margin_m: 0.0 };
         let mut of_candidates = Vec::with_capacity(candidates.len());
         let mut better: Vec<(usize, PathClearance)> = Vec::new();
         for (k, profile) in candidates.iter().enumerate() {
-            let (clearance, threats) = self.clearance(profile);
-            of_candidates.push(threats);
+            let result = self.clearance(profile);
+            let clearance = result.0;
+            of_candidates.push(result.1);
             if clearance == full || clearance > required {
                 better.push((k, clearance));
             }

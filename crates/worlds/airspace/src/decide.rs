@@ -217,12 +217,12 @@ pub(super) fn candidates_by_velocity(
         let each = non_cooperative.iter();
         each.map(|one| non_cooperative_state(world, one, seconds)).collect()
     };
-    candidates_beside_others(world, group, &others_at, memory, now)
+    candidates_in_traffic(world, group, &others_at, memory, now)
 }
 
 /// Returns the same for airplanes with all around them, of which `others_at` gives the states some seconds after the
 /// start of the cycle.
-pub(super) fn candidates_beside_others(
+pub(super) fn candidates_in_traffic(
     world: &AirspaceWorld,
     group: &[KnownAircraft],
     others_at: &OthersAt<'_>,

@@ -234,6 +234,7 @@ impl Event {
         (self.cycle, self.airplane, self.kind, self.other)
     }
 }
+
 /// Returns the event of an airplane for which the shield's search for a joint choice of plans, clear of a non-cooperative
 /// aircraft, has come to its limit.
 pub(crate) fn search_limit(

@@ -3,8 +3,8 @@
 use crate::avoid::group_threats;
 use crate::baseline::ReactiveMemory;
 use crate::decide::{
-    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_beside_others,
-    candidates_for_group, non_cooperative_state,
+    DecisionStrategy, ManeuverCandidates, candidates_alone, candidates_for_group,
+    candidates_in_traffic, non_cooperative_state,
 };
 use crate::events::{Event, EventKind, search_limit};
 use crate::flight::KnownAircraft;
@@ -133,7 +133,7 @@ fn candidates_by_tracks(
         };
         let own = std::slice::from_ref(known);
         let memory = std::slice::from_mut(memory);
-        all.extend(candidates_beside_others(world, own, &others_at, memory, now));
+        all.extend(candidates_in_traffic(world, own, &others_at, memory, now));
     }
     all
 }

@@ -98,7 +98,7 @@ pub(super) fn assign_fallbacks(
     for (one, &slot) in group.iter_mut().zip(flown) {
         // Another fallback may lead to a non-cooperative aircraft.
         if !is_entering(slot) {
-            one.choices = choices_beside(one, non_cooperative, world.timing);
+            one.choices = clear_choices(one, non_cooperative, world.timing);
         }
     }
     let role = |&slot: &EntitySlot| if is_entering(slot) { EntryRole::Enter } else { others };
@@ -124,7 +124,7 @@ pub(super) fn assign_fallbacks(
 
 /// Returns those of the fallbacks that an airplane may choose which are clear of all non-cooperative aircraft of which its
 /// stored one is clear, in the next `dt`.
-fn choices_beside(
+fn clear_choices(
     aircraft: &ShieldedAircraft,
     non_cooperative: &[NonCooperativeAircraft],
     timing: TimeDiscretization,

@@ -411,7 +411,7 @@ impl ShieldExchangeAgent {
         let decision = match self.common_plan(self.me) {
             // A common plan leaves it predictable for all that do not hear it, in the cycles to come, too. That is worth
             // more than a better path now.
-            Some(common) => ShieldDecision::settled(common.fallback),
+            Some(common) => ShieldDecision::from_fallback(common.fallback),
             None => self.compute_own_decision(),
         };
         self.decision = Some(decision);
@@ -506,7 +506,7 @@ impl ShieldExchangeAgent {
 
     /// Ends the exchange: the airplane flies its plan, or its fallback.
     fn conclude(&mut self) {
-        let fallback = ShieldDecision::settled(self.aircraft.fallback);
+        let fallback = ShieldDecision::from_fallback(self.aircraft.fallback);
         let preferred = self.decision.unwrap_or(fallback);
         let all_agree = self.asked.iter().all(|&place| self.has_accepted_own_plan(place));
         let has_plan = matches!(self.members[self.me].plan, Some(Some(_)));

@@ -116,9 +116,9 @@ impl Maneuver {
         match *self {
             Self::Profile { candidate, fallback, .. } => {
                 let candidate = Some(candidate as usize);
-                ShieldDecision { candidate, ..ShieldDecision::settled(fallback) }
+                ShieldDecision { candidate, ..ShieldDecision::from_fallback(fallback) }
             }
-            Self::Orbit => ShieldDecision::settled(stored),
+            Self::Orbit => ShieldDecision::from_fallback(stored),
         }
     }
 }

@@ -26,7 +26,7 @@ pub struct ShieldDecision {
 
 impl ShieldDecision {
     /// Returns the decision to fly the stored fallback, or what all compute for the airplane, and to store a fallback.
-    pub fn settled(fallback: Fallback) -> Self {
+    pub fn from_fallback(fallback: Fallback) -> Self {
         Self { candidate: None, fallback, unproved_threat: None }
     }
 }

@@ -172,7 +172,7 @@ proptest! {
             for ((decision, follows), aircraft) in decisions.iter_mut().zip(follow).zip(&group) {
                 if !follows {
                     let rest = aircraft.fallback.after_cycle();
-                    *decision = ShieldDecision::settled(rest);
+                    *decision = ShieldDecision::from_fallback(rest);
                 }
             }
         }

@@ -277,11 +277,12 @@ impl MigratingCoordinator for Coordinator {
         state.has_changes = services.own.common.has_changes();
         if state.has_changes {
             let read = postcard::take_from_bytes::<Vec<u32>>(rest);
-            let (orders, end) = read.map_err(|_| InvalidMessage::Form)?;
+            let list = read.map_err(|_| InvalidMessage::Form)?;
+            let orders = list.0;
+            rest = list.1;
             let airplanes = &mut state.data.airplanes;
             InvalidMessage::Length.ensure(orders.len() == airplanes.len())?;
             airplanes.iter_mut().zip(orders).for_each(|(one, orders)| one.orders = orders);
-            rest = end;
         }
         InvalidMessage::Form.ensure(rest.is_empty())?;
         check::check_state(&state, services, number)?;
