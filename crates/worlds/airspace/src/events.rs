@@ -53,8 +53,9 @@ pub enum EventKind {
     LowHold,
     /// An airplane is in the air for longer than its endurance; the value is its endurance in seconds.
     EnduranceExceedance,
-    /// An airplane drops its track of another one, because it has received no report of that one for the coast time; the
-    /// value is the age of the last report in seconds.
+    /// An airplane drops its track of another one, because it has received no report of that one for the coast time. One that
+    /// has only now come near counts, too, if there would have been a track of it in the cycle before. The value is the age
+    /// of the last report in seconds.
     TrackDropped,
 }
 

@@ -161,8 +161,8 @@ metrics! {
         pub track_availability: Option<f64> => "availability of tracks",
         /// Mean age of these tracks: the time since the last report. In seconds.
         pub mean_track_age_s: Option<f64> => "mean age of tracks",
-        /// Times that an airplane dropped its track of another one, of which it received no reports; none without
-        /// `airspace.surveillance`.
+        /// Times that an airplane dropped its track of another one, of which it received no reports, or would have had one to
+        /// drop if the other had been near in the cycle before; none without `airspace.surveillance`.
         pub tracks_dropped: Option<u64> => "tracks dropped",
         /// Times that an airplane lost contact with another one.
         pub contacts_lost: u64 => "contacts lost",

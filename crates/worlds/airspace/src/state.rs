@@ -25,7 +25,7 @@ use sidestep_kernel::column::AtomicCell;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot, math};
 pub use snapshot::{AirplaneSnapshot, PairRecord, Snapshot};
 use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The state of an airspace; slots are ids.
 #[derive(Debug)]
@@ -56,8 +56,8 @@ pub struct AirspaceState {
     commands: Box<[Mutex<AirplaneCommand>]>,
     /// The action that a caller has ordered for each airplane; empty unless callers decide.
     external_actions: Box<[Mutex<Option<ExternalAction>>]>,
-    /// The past states of each airplane; empty where all see all.
-    state_vectors: Box<[Mutex<StateVectorHistory>]>,
+    /// The past states of each airplane, which the reports of a cycle share; empty where all see all.
+    state_vectors: Box<[Mutex<Arc<StateVectorHistory>>]>,
     /// The cycle for which controls were submitted, or [`NEVER`].
     controls_cycle: AtomicCell<u64>,
     /// The controls of that cycle, until their groups take them out.
@@ -264,7 +264,7 @@ impl AirspaceState {
                 .collect(),
             commands: restore_memories(with_commands, &snapshot.commands),
             external_actions: restore_memories(with_external_actions, &snapshot.external_actions),
-            state_vectors: restore_memories(with_state_vectors, &snapshot.state_vectors),
+            state_vectors: state_vectors::restore(with_state_vectors, &snapshot.state_vectors),
             controls_cycle,
             controls: Mutex::default(),
         };
@@ -443,7 +443,7 @@ impl AirspaceState {
             controls,
             efforts: self.efforts.iter().map(|one| *lock(one)).collect(),
             holds: self.holds.iter().map(AtomicCell::get).collect(),
-            state_vectors: self.state_vectors.iter().map(|one| lock(one).clone()).collect(),
+            state_vectors: self.all_state_vectors(),
         }
     }
 

@@ -10,6 +10,7 @@ use sidestep_kernel::EntitySlot;
 use sidestep_kernel::distr::normal_pair;
 use sidestep_kernel::geometry::{add, scaled};
 use sidestep_kernel::math;
+use std::sync::Arc;
 
 /// Numbers of the draws of one observer, airplane and report.
 const RECEPTION_DRAW: u32 = 0;
@@ -21,7 +22,8 @@ const VELOCITY_DRAW: u32 = 2;
 pub(crate) enum LastReport {
     /// That of a step, which is recent enough for a track.
     Recent(u64),
-    /// That of a step so long ago that the track was dropped in this cycle.
+    /// That of a step so long ago that there is no track from this cycle on. In the cycle before there was one if the other
+    /// airplane was near, which reports do not tell.
     JustDropped(u64),
     /// None for so long that there was no track in the cycle before, either.
     None,
@@ -35,7 +37,7 @@ pub(crate) struct ReportArchive<'a, 'b> {
     now_step: u64,
     /// The airplanes of the group, by rising id.
     group: &'a [EntitySlot],
-    histories: Vec<StateVectorHistory>,
+    histories: Vec<Arc<StateVectorHistory>>,
     present: Vec<StateVector>,
 }
 
