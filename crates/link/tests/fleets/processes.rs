@@ -233,7 +233,7 @@ fn processes_come_out_as_one_process_does_and_leave_an_ordinary_folder() {
     assert_eq!(recorded.expect("a summary")["digest"], one.digest);
 }
 
-/// All deployments, with and without faults.
+/// Commanded levels and speeds travel in reports, also over a network that loses messages.
 #[test]
 fn processes_come_out_as_one_process_does_where_levels_and_speeds_are_commanded() {
     let mvp = "method = \"mvp\"\nmvp = { resolution = \"heading-speed-vertical\" }\nnetwork = { loss = 0.1 }";
@@ -248,6 +248,7 @@ fn processes_come_out_as_one_process_does_where_levels_and_speeds_are_commanded(
     assert!(one.metrics["commands_held"].is_u64(), "{}", one.metrics);
 }
 
+/// All deployments, with and without faults.
 #[test]
 #[ignore = "minutes of processor time: eight whole flights of ten airplanes"]
 fn a_whole_super_conflict_of_ten_comes_out_as_in_one_process_in_every_deployment() {
