@@ -2,13 +2,15 @@
 //!
 //! They are no errors, because sweeps and `compare` fly one scenario by several methods.
 
+use super::surveillance::SurveillanceSection;
 use super::{AirspaceSection, CompiledAirspace, ModelSection};
 use crate::flight::{AirplaneStart, FlightTask, TurnLimit};
 use crate::method::MethodKind;
-use crate::settings::{Combinations, Resolution};
+use crate::settings::{Combinations, Resolution, RightOfWayRule};
 use crate::surveillance::each_decides_by_tracks;
+use crate::world::AirspaceWorld;
 use sidestep_kernel::distr::Bernoulli;
-use sidestep_scenario::Remark;
+use sidestep_scenario::{Remark, Spanned};
 
 /// Returns the remarks on a scenario, in the order of its keys.
 pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
@@ -46,9 +48,17 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
             note(&format!("mvp.{key}"), because);
         }
     }
+    let is_horizontal = "right_of_way resolves conflicts in the horizontal alone";
     if has_no_vertical_resolution(compiled) {
-        let because = "right_of_way resolves conflicts in the horizontal alone";
-        note("mvp.resolution", because);
+        note("mvp.resolution", is_horizontal);
+    }
+    if never_changes_levels(compiled) {
+        for key in section.mvp.vertical_keys() {
+            note(&format!("mvp.{key}"), is_horizontal);
+        }
+    }
+    if let Some(key) = effectless_right_of_way(compiled).filter(|_| !is_for_both) {
+        note(key, "no airplane avoids others by any method while it holds");
     }
     if !is_for_both && section.orca.is_given() && !uses(|method| matches!(method, MethodKind::Orca))
     {
@@ -73,7 +83,11 @@ pub(super) fn effectless_remarks(compiled: &CompiledAirspace) -> Vec<Remark> {
         note("measures.lift_to_drag", "measures.flights is \"off\"");
     }
     if section.error_sigmas.is_some() && has_no_errors(compiled) {
-        note("error_sigmas", "no position and no heading has errors for which it counts");
+        note(
+            "error_sigmas",
+            "no position and no heading has errors for which it counts; those of surveillance count for non-cooperative \
+             airplanes alone",
+        );
     }
     if section.surveillance.is_some() && !is_anybody_observed(compiled) {
         note(
@@ -118,6 +132,31 @@ fn has_no_vertical_resolution(compiled: &CompiledAirspace) -> bool {
         })
 }
 
+/// Returns whether MVP may change levels by its settings, and never does by the rules of right of way.
+fn never_changes_levels(compiled: &CompiledAirspace) -> bool {
+    let changes_level = |rules: &&AirspaceWorld| {
+        matches!(rules.method, MethodKind::Mvp) && rules.mvp_resolution.resolution.changes_level()
+    };
+    let mut rules = compiled.world.all_rules().filter(changes_level).peekable();
+    rules.peek().is_some() && rules.all(|rules| rules.right_of_way.is_horizontal())
+}
+
+/// Returns the key of a rule of right of way that is given, if none ever holds together with a method by which airplanes
+/// avoid others: the shield goes by priorities alone.
+fn effectless_right_of_way(compiled: &CompiledAirspace) -> Option<&'static str> {
+    let mut rules = compiled
+        .world
+        .all_rules()
+        .filter(|rules| rules.right_of_way != RightOfWayRule::None)
+        .peekable();
+    rules.peek()?;
+    let is_given_at_start = compiled.world.right_of_way != RightOfWayRule::None;
+    let key = if is_given_at_start { "right_of_way" } else { "changes.right_of_way" };
+    let has_no_effect =
+        rules.all(|rules| matches!(rules.method, MethodKind::None | MethodKind::External));
+    has_no_effect.then_some(key)
+}
+
 /// Returns why the time for which tracks coast has no effect, if it is given and has none.
 fn effectless_coast(compiled: &CompiledAirspace) -> Option<&'static str> {
     let section = compiled.recipe.file.airspace.surveillance.as_ref()?;
@@ -128,13 +167,15 @@ fn effectless_coast(compiled: &CompiledAirspace) -> Option<&'static str> {
 
 /// Returns whether any airplane is seen by reports under some of the rules.
 fn is_anybody_observed(compiled: &CompiledAirspace) -> bool {
-    let airplanes = compiled.world.airplanes.len();
-    compiled.world.all_rules().any(|rules| {
-        // One on a recorded track is non-cooperative for a while.
-        let is_tracked = |i: usize| rules.airplanes[i].track.is_some() && rules.replay_cycles > 0;
-        each_decides_by_tracks(rules)
-            || (0..airplanes).any(|i| !rules.is_controlled(i) || is_tracked(i))
-    })
+    let is_observed = |rules| each_decides_by_tracks(rules) || has_non_cooperative(rules);
+    compiled.world.all_rules().any(is_observed)
+}
+
+/// Returns whether any airplane is non-cooperative under some rules, for a while at least.
+fn has_non_cooperative(rules: &AirspaceWorld) -> bool {
+    // One on a recorded track is, until it is handed over.
+    let is_tracked = |i: usize| rules.airplanes[i].track.is_some() && rules.replay_cycles > 0;
+    (0..rules.airplanes.len()).any(|i| !rules.is_controlled(i) || is_tracked(i))
 }
 
 /// Returns the lowest altitude in meters that an airplane has by its start and its orders.
@@ -271,192 +312,18 @@ fn looks_anew(compiled: &CompiledAirspace) -> bool {
     })
 }
 
+/// Returns whether nothing has errors that the shield bounds. Of the errors of sensors it bounds those with which
+/// non-cooperative airplanes are seen.
 fn has_no_errors(compiled: &CompiledAirspace) -> bool {
     let section = &compiled.recipe.file.airspace;
     let is_zero = |noise: Option<f64>| noise.is_none_or(|noise| noise == 0.0);
-    let surveillance = section.surveillance.as_ref();
+    let has_noise = |given: &Spanned<SurveillanceSection>| given.get_ref().has_position_noise();
+    let has_sensor_errors = section.surveillance.as_ref().is_some_and(has_noise)
+        && compiled.world.all_rules().any(has_non_cooperative);
     is_zero(section.heading_noise_deg.map(f64::from))
         && !compiled.world.has_position_errors
-        && !surveillance.is_some_and(|given| given.get_ref().has_position_noise())
+        && !has_sensor_errors
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use sidestep_scenario::Source;
-
-    fn remarks(keys: &str) -> Vec<String> {
-        let text = format!(
-            "format = 1\nworld = \"airspace\"\n[airspace]\n{keys}\n[airspace.generator]\nkind = \"superconflict\"\nn = 2\n"
-        );
-        let compiled = CompiledAirspace::new(&Source::new("test", text, "")).expect("a scenario");
-        effectless_remarks(&compiled).into_iter().map(|remark| remark.key).collect()
-    }
-
-    #[test]
-    fn changes_of_level_and_speed_that_nobody_chooses_among_are_named() {
-        let weights = "combinations = \"all\"\nlevel_weight = 2.0\nspeed_weight = 1.0\n";
-        let of_weights = ["combinations", "level_weight", "speed_weight"];
-        let of_weights = of_weights.map(|key| format!("airspace.{key}"));
-        assert_eq!(remarks(weights), of_weights);
-        let changes = "[airplane]\nlevel_changes_m = [300.0]\nspeed_changes_m_s = [-3.0]\n";
-        assert_eq!(remarks(&format!("{weights}{changes}")), [""; 0]);
-        let by_mvp = remarks(&format!("method = \"mvp\"\n{weights}{changes}"));
-        let of_changes = ["airplane.level_changes_m", "airplane.speed_changes_m_s"];
-        assert_eq!(by_mvp[..3], of_weights);
-        assert_eq!(by_mvp[3..], of_changes);
-    }
-
-    #[test]
-    fn settings_of_a_method_that_nobody_uses_are_named() {
-        let optimizer = "alpha = 0.1\ncooling = 0.5\nmax_rounds = 3\n";
-        assert_eq!(remarks(optimizer), [""; 0]);
-        let keys = ["alpha", "cooling", "max_rounds"].map(|key| format!("airspace.{key}"));
-        for method in ["none", "mvp", "orca", "bands", "external"] {
-            assert_eq!(remarks(&format!("method = \"{method}\"\n{optimizer}")), keys, "{method}");
-        }
-        let mvp = "mvp = { margin = 1.3 }\n";
-        assert_eq!(remarks(mvp), ["airspace.mvp"]);
-        assert_eq!(remarks(&format!("method = \"mvp\"\n{mvp}")), [""; 0]);
-        let vertical = "method = \"mvp\"\nmvp = { resolution = \"vertical\", resolution_factor = 1.1, vertical_factor = 1.1 }\n";
-        assert_eq!(remarks(vertical), ["airspace.mvp.resolution_factor"]);
-        let heading =
-            "method = \"mvp\"\nmvp = { vertical_factor = 1.1, speed_factors = [0.9, 1.1] }\n";
-        assert_eq!(
-            remarks(heading),
-            ["airspace.mvp.vertical_factor", "airspace.mvp.speed_factors"]
-        );
-        assert_eq!(remarks("orca = { look_ahead_s = 20.0 }\n"), ["airspace.orca"]);
-        assert_eq!(remarks("bands = { look_ahead_s = 20.0 }\n"), ["airspace.bands"]);
-        assert_eq!(remarks("look_every_s = 5.0\n"), ["airspace.look_every_s"]);
-        assert_eq!(remarks("method = \"none\"\nlook_every_s = 5.0\n"), [""; 0]);
-    }
-
-    #[test]
-    fn resolutions_by_levels_under_a_rule_without_any_are_named() {
-        let vertical = "method = \"mvp\"\nmvp = { resolution = \"vertical\" }\n";
-        for (rule, named) in [
-            ("cruising-first", &[][..]),
-            ("cruising-first-horizontal", &["airspace.mvp.resolution"]),
-            ("climbing-first-horizontal", &["airspace.mvp.resolution"]),
-        ] {
-            assert_eq!(remarks(&format!("{vertical}right_of_way = {rule:?}\n")), named, "{rule}");
-        }
-    }
-
-    #[test]
-    fn actions_have_an_effect_with_every_method() {
-        let actions = "holds_s = [2.0]\nlegs = { turns_s = [20.0], until_s = [80.0] }\n";
-        for method in ["pc", "none", "mvp", "orca", "bands", "external"] {
-            assert_eq!(remarks(&format!("method = \"{method}\"\n{actions}")), [""; 0], "{method}");
-        }
-    }
-
-    #[test]
-    fn a_margin_of_predictions_has_no_effect_beside_methods_with_margins_of_their_own() {
-        for (method, is_named) in
-            [("none", false), ("external", false), ("mvp", true), ("orca", true), ("bands", true)]
-        {
-            let found = remarks(&format!("method = \"{method}\"\ninflation = 1.3\n"));
-            assert_eq!(found == ["airspace.inflation"], is_named, "{method}: {found:?}");
-        }
-    }
-
-    #[test]
-    fn nobody_is_told_of_keys_that_an_import_has_written() {
-        let flights = "00:00:00>CRE A1,B744,0,-0.4,90,FL200,250\n00:00:00>DEST A1 0,0.4\n";
-        for settings in ["", "00:00:00>RESO MVP\n", "00:00:00>RESO OFF\n", "00:00:00>DTLOOK 60\n"] {
-            let file = sidestep_import::bluesky::parse(&"r.scn", &format!("{settings}{flights}"));
-            let text = crate::traffic::from_bluesky("r", &file).expect("it has aircraft");
-            let compiled = CompiledAirspace::new(&Source::new("r", text, "")).expect("a scenario");
-            let found = effectless_remarks(&compiled);
-            assert!(found.is_empty(), "{settings}: {found:?}");
-        }
-    }
-
-    #[test]
-    fn a_scenario_for_methods_of_both_kinds_is_no_mistake() {
-        let both = "legs = { turns_s = [20.0], until_s = [80.0] }\nlook_every_s = 5.0\n";
-        assert_eq!(remarks(both), [""; 0]);
-        assert_eq!(remarks(&format!("method = \"mvp\"\n{both}")), [""; 0]);
-    }
-
-    #[test]
-    fn settings_of_a_method_that_comes_later_have_an_effect() {
-        let changes = "changes = [{ at_s = 50.0, method = \"mvp\" }]\nmvp = { margin = 1.3 }\n";
-        assert_eq!(remarks(&format!("method = \"none\"\n{changes}")), [""; 0]);
-    }
-
-    #[test]
-    fn limits_that_no_airplane_comes_near_are_named() {
-        let named = |airplane: &str, orders: &str| -> Vec<String> {
-            let text = format!(
-                "format = 1\nworld = \"airspace\"\n[airplane]\n{airplane}\n[[airplanes]]\nat_m = [0, 0]\n\
-                 heading_deg = 0\nway_points_m = [[9000, 0]]\n{orders}\n"
-            );
-            let compiled = CompiledAirspace::new(&Source::new("l", text, "")).expect("a scenario");
-            effectless_remarks(&compiled).into_iter().map(|remark| remark.key).collect()
-        };
-        let limits = "acceleration_m_s2 = 1.0\nclimb_max_m_s = 9.0\ndescent_max_m_s = 9.0\n\
-                      bank_max_deg = 5.0\nomega_max_deg_s = 4.0";
-        let all = ["omega_max_deg_s", "acceleration_m_s2", "climb_max_m_s", "descent_max_m_s"];
-        assert_eq!(named(limits, ""), all.map(|key| format!("airplane.{key}")));
-        let orders = "orders = [{ speed_m_s = 9.0 }, { altitude_m = 9.0 }]";
-        assert_eq!(named(limits, orders), [""; 0], "the turn rate limits it when it is slow");
-    }
-
-    #[test]
-    fn tables_of_types_that_no_airplane_names_are_named() {
-        assert_eq!(remarks("openap_folder = \"data\"\n"), ["airspace.openap_folder"]);
-    }
-
-    #[test]
-    fn settings_of_measures_that_are_not_taken_are_named() {
-        let settings = "well_clear = { standard = \"do-365\" }\nnmac = { vertical_m = 20.0 }\n";
-        assert_eq!(remarks(settings), [""; 0]);
-        let off = "measures = { pairs = \"off\", look_ahead_s = 30.0 }\n";
-        assert_eq!(
-            remarks(&format!("{off}{settings}")),
-            ["airspace.measures.look_ahead_s", "airspace.well_clear", "airspace.nmac"]
-        );
-        let off = "measures = { flights = \"off\", lift_to_drag = 12.0 }\n";
-        assert_eq!(remarks(off), ["airspace.measures.lift_to_drag"]);
-    }
-
-    #[test]
-    fn a_safe_altitude_below_which_nobody_is_held_is_named() {
-        let named = ["airspace.safe_altitude_m"];
-        assert_eq!(remarks("safe_altitude_m = 100.0\n"), [""; 0], "all fly at 0 m");
-        assert_eq!(remarks("safe_altitude_m = -5.0\n"), named);
-        assert_eq!(remarks("safe_altitude_m = 100.0\nshield = \"off\"\n"), named);
-    }
-
-    #[test]
-    fn surveillance_by_which_nobody_is_seen_is_named() {
-        let keys = "surveillance = { latency_s = 1.0 }\n";
-        assert_eq!(remarks(keys), ["airspace.surveillance"]);
-        for method in ["mvp", "orca", "bands", "external"] {
-            assert_eq!(remarks(&format!("method = \"{method}\"\n{keys}")), [""; 0], "{method}");
-        }
-        let team = "method = \"mvp\"\ndeployment = \"team\"\n";
-        assert_eq!(remarks(&format!("{team}{keys}")), ["airspace.surveillance"]);
-        let later = "changes = [{ at_s = 50.0, airplanes = [1], non_cooperative = true }]\n";
-        assert_eq!(remarks(&format!("{later}{keys}")), [""; 0]);
-        let coast = "method = \"mvp\"\nsurveillance = { coast_s = 20.0 }\n";
-        assert_eq!(remarks(coast), ["airspace.surveillance.coast_s"]);
-        let missed = coast.replace("coast_s", "reception_probability = 0.5, coast_s");
-        assert_eq!(remarks(&missed), [""; 0]);
-        let velocity = "method = \"mvp\"\n[airplane]\nnac_v = 2\n";
-        assert_eq!(remarks(velocity), ["airplane.nac_v"]);
-        assert_eq!(remarks(&format!("{keys}{velocity}")), [""; 0]);
-        let noise =
-            "method = \"mvp\"\nerror_sigmas = 3.0\nsurveillance = { position_noise_m = 9.0 }\n";
-        assert_eq!(remarks(noise), [""; 0]);
-    }
-
-    #[test]
-    fn a_bound_on_errors_without_errors_is_named() {
-        assert_eq!(remarks("error_sigmas = 3.0\n"), ["airspace.error_sigmas"]);
-        assert_eq!(remarks("error_sigmas = 3.0\nposition_noise_m = 2.0\n"), [""; 0]);
-    }
-}
+mod tests;

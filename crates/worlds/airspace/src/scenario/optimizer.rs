@@ -139,16 +139,22 @@ impl MvpSection {
         if self.resolution_factor.is_some() && resolution == Resolution::Vertical {
             keys.push("resolution_factor");
         }
-        if self.vertical_factor.is_some() && !resolution.changes_level() {
-            keys.push("vertical_factor");
-        }
-        if self.vertical_lead_s.is_some() && !resolution.changes_level() {
-            keys.push("vertical_lead_s");
+        if !resolution.changes_level() {
+            keys.extend(self.vertical_keys());
         }
         if self.speed_factors.is_some() && !resolution.changes_speed() {
             keys.push("speed_factors");
         }
         keys
+    }
+
+    /// Returns the keys of changes of level that are given.
+    pub(super) fn vertical_keys(&self) -> impl Iterator<Item = &'static str> {
+        let given = [
+            ("vertical_factor", self.vertical_factor.is_some()),
+            ("vertical_lead_s", self.vertical_lead_s.is_some()),
+        ];
+        given.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key)
     }
 
     /// Returns how conflicts are resolved, as `default` where nothing is given.
