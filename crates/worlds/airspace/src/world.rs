@@ -272,7 +272,7 @@ impl AirspaceWorld {
         let max_lead_s = (look_ahead_s - self.timing.dt_s - 2.0 * radius_s).max(radius_s);
         let model = &self.airplanes[i].model;
         let choices = Fallback::choices(model, self.orbit_rad_s[i], self.timing.dt_s, max_lead_s);
-        self.with_ways_out(i, choices)
+        self.with_escape_fallbacks(i, choices)
     }
 
     /// Returns whether airplanes compute plans for each other from what all see: where messages get lost, all see the same,

@@ -12,7 +12,11 @@ use std::sync::Arc;
 
 impl AirspaceWorld {
     /// Returns fallbacks with longer ones beside them that lead out of areas that begin while an airplane flies.
-    pub(super) fn with_ways_out(&self, i: usize, choices: Arc<[Fallback]>) -> Arc<[Fallback]> {
+    pub(super) fn with_escape_fallbacks(
+        &self,
+        i: usize,
+        choices: Arc<[Fallback]>,
+    ) -> Arc<[Fallback]> {
         let v_m_s = self.airplanes[i].model.v_m_s;
         let longest = choices.iter().map(|choice| choice.straight_cycles).max().unwrap_or(0);
         let dt_m = v_m_s * self.timing.dt_s;
