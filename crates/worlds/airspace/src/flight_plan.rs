@@ -6,7 +6,7 @@
 pub(super) mod limits;
 
 use super::flight::{
-    FlightOrder, FlightTask, MAX_ORDERS, Performance, Surface, Track, TrackPoint,
+    CLIMB_M_S, FlightOrder, FlightTask, MAX_ORDERS, Performance, Surface, Track, TrackPoint,
     coordinates_from_degrees,
 };
 use super::settings::{
@@ -20,8 +20,6 @@ use sidestep_kernel::{InputError, math};
 use sidestep_scenario::{Closed, FixedList, Integer, LeftOpen, Number, Point, Source, Spanned};
 use std::ops::Range;
 
-/// Rate at which levels are changed when an order does not give one: 1500 ft/min.
-pub(super) const CLIMB_M_S: f64 = 7.62;
 /// A position, height or angle within reasonable bounds.
 pub(super) type BoundedNumber = Number<Closed<-1_000_000_000, 1_000_000_000>>;
 /// A time within reasonable bounds, not before the start.

@@ -20,8 +20,8 @@
 //! track, speed and vertical speed for as long as the conflict lasts.
 
 use crate::baseline::AircraftState;
+use crate::flight::CLIMB_M_S;
 use crate::flight::{AirplaneStart, FlightOrder, FlightTask, KnownAircraft};
-use crate::flight_plan::CLIMB_M_S;
 use crate::settings::RightOfWayRule;
 use crate::world::AirspaceWorld;
 use sidestep_kernel::EntitySlot;

@@ -8,8 +8,8 @@
 
 use super::orders::fallback_at_speed;
 use crate::events::{Event, EventKind};
+use crate::flight::CLIMB_M_S;
 use crate::flight::{InterOrderSegment, LevelCommand, MethodCommand};
-use crate::flight_plan::CLIMB_M_S;
 use crate::scratch::PhaseContext;
 use crate::state::AirplaneCommand;
 use sidestep_kernel::EntitySlot;

@@ -8,11 +8,11 @@ use super::around_areas::{SteeredAircraft, has_areas_ahead, steer_around_areas};
 use super::local_flight::LocalFlight;
 use super::preferences::{rank_by_turn_difference, turn_profiles_from_actions};
 use crate::baseline::{AircraftState, ReactiveMemory, bands, mvp, orca};
+use crate::flight::CLIMB_M_S;
 use crate::flight::{
     Frame, InterOrderSegment, KnownAircraft, LevelCommand, MethodCommand, Point, Pose2, Surface,
     rotated,
 };
-use crate::flight_plan::CLIMB_M_S;
 use crate::method::{MethodKind, MethodPercept, OwnMethod, Steering};
 use crate::non_cooperative::NonCooperativeAircraft;
 use crate::purpose;

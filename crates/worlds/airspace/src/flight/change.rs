@@ -2,9 +2,9 @@
 
 use super::command::{LevelCommand, MethodCommand};
 use super::levels::FlightLevelRange;
+use super::performance::CLIMB_M_S;
 use super::performance::Performance;
 use super::segment::InterOrderSegment;
-use crate::flight_plan::CLIMB_M_S;
 use serde::{Deserialize, Serialize};
 
 /// A change of level and speed beside the filed flight, kept for the whole horizon: the parts of an action beside its

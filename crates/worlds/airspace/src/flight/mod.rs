@@ -56,7 +56,7 @@ pub(crate) use motion::{MAX_STEPS_PER_DT, rotated};
 pub use order::{FlightOrder, FlightTask, MAX_ORDERS};
 pub use pair_plane::PairPlane;
 pub(crate) use pair_plane::RigidMotion;
-pub(crate) use performance::GRAVITY_M_S2;
+pub(crate) use performance::{CLIMB_M_S, GRAVITY_M_S2};
 pub use performance::{Performance, TurnLimit};
 pub use phase::FlightPhase;
 pub(crate) use proximity::{PairZones, Proximity};

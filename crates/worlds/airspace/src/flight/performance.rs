@@ -4,6 +4,8 @@ use sidestep_kernel::math;
 
 /// Acceleration of gravity in meters per second squared.
 pub(crate) const GRAVITY_M_S2: f64 = 9.80665;
+/// Rate at which levels are changed when an order does not give one, in meters per second: 1500 ft/min.
+pub(crate) const CLIMB_M_S: f64 = 7.62;
 
 /// The limits on an airplane's turn rate, of which the smaller one holds.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,8 +1,8 @@
 //! The section of surveillance, and what cannot be flown by it.
 
 use super::compile::Compiler;
+use crate::flight::CLIMB_M_S;
 use crate::flight::{Point, TimeDiscretization};
-use crate::flight_plan::CLIMB_M_S;
 use crate::method::MethodKind;
 use crate::settings::SurveillanceSettings;
 use crate::world::AirspaceWorld;
@@ -192,7 +192,7 @@ fn commanded_climb_m_s(world: &AirspaceWorld) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use crate::flight_plan::CLIMB_M_S;
+    use crate::flight::CLIMB_M_S;
     use crate::scenario::CompiledAirspace;
     use sidestep_scenario::Source;
 

@@ -25,15 +25,17 @@
 //! otherwise. So it is within `E + (s + v + w) a` of its track, where `E` bounds the errors of the report. One of which nobody in the group has a track cannot be avoided. The run, which
 //! knows where it is, names each pair with it before that pair may lose separation.
 
+mod observation_counts;
 mod observations;
 mod perceived_traffic;
 mod report_archive;
+mod state_report;
 mod state_vector;
 #[cfg(test)]
 mod tests;
 mod track;
 
-pub use observations::ObservationCounts;
+pub use observation_counts::ObservationCounts;
 pub(crate) use observations::{GroupObservations, each_decides_by_tracks};
 pub(crate) use perceived_traffic::PerceivedTraffic;
 pub use state_vector::{StateVector, StateVectorHistory};

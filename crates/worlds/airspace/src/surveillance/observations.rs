@@ -1,5 +1,6 @@
 //! The observations of a group in a cycle: the tracks of each observer, and what a run counts of them.
 
+use super::observation_counts::ObservationCounts;
 use super::report_archive::{LastReport, ReportArchive};
 use super::track::SurveillanceTrack;
 use crate::decide::DecisionStrategy;
@@ -9,28 +10,7 @@ use crate::method::MethodKind;
 use crate::scratch::PhaseContext;
 use crate::settings::Deployment;
 use crate::world::AirspaceWorld;
-use serde::{Deserialize, Serialize};
 use sidestep_kernel::EntitySlot;
-
-/// Sums over observations: one is of another airplane by an observer in a cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct ObservationCounts {
-    /// Number of observations.
-    pub observations: u64,
-    /// Number of those in which the observer had a track.
-    pub tracked: u64,
-    /// Sum of the ages of these tracks, in steps of `dtau`.
-    pub age_steps: u64,
-}
-
-impl ObservationCounts {
-    /// Adds the sums of another part of the run.
-    pub(crate) fn add(&mut self, other: Self) {
-        self.observations += other.observations;
-        self.tracked += other.tracked;
-        self.age_steps += other.age_steps;
-    }
-}
 
 /// The tracks that one airplane has of others.
 #[derive(Debug)]

@@ -1,5 +1,6 @@
 //! The reports of the airplanes of a group, and who has received them.
 
+use super::state_report::{present_state, with_navigation_errors};
 use super::state_vector::{StateVector, StateVectorHistory};
 use super::track::SurveillanceTrack;
 use crate::events::{Event, EventKind};
@@ -50,7 +51,7 @@ impl<'a, 'b> ReportArchive<'a, 'b> {
             settings,
             now_step: now * world.timing.points_per_dt() as u64,
             histories: group.iter().map(|&slot| state.state_vectors(slot)).collect(),
-            present: group.iter().map(|&slot| StateVector::at_present(context, slot)).collect(),
+            present: group.iter().map(|&slot| present_state(context, slot)).collect(),
             context,
             group,
         })
@@ -128,7 +129,8 @@ impl<'a, 'b> ReportArchive<'a, 'b> {
         let [_, subject] = pair;
         let world = self.context.world;
         let slot = self.group[subject];
-        let reported = self.state_at(subject, step)?.with_navigation_errors(self.context, slot);
+        let state = *self.state_at(subject, step)?;
+        let reported = with_navigation_errors(self.context, slot, state);
         let SurveillanceSettings { position_noise_m, velocity_noise_m_s, .. } = self.settings;
         let mut at = reported.pose.at;
         if position_noise_m > 0.0 {

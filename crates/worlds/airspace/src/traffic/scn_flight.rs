@@ -1,7 +1,7 @@
 //! The level and the airspeed of an aircraft of a BlueSky file from command to command.
 
 use super::{FOOT_M, MIN_SPEED_M_S};
-use crate::flight_plan::CLIMB_M_S;
+use crate::flight::CLIMB_M_S;
 use sidestep_import::bluesky::{Airspeed, ScnAircraft};
 
 /// Feet between two levels at which the true airspeed of a climb is computed.
