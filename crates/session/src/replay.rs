@@ -63,6 +63,10 @@ pub fn replay_all(
         return Err(Error::other(cause, remedy));
     }
     recorded.verify_digest(run.as_ref())?;
+    if let Some(rows) = &mut rows {
+        // A recording that is complete has those of what lasts at its end, too.
+        run.record_open(rows)?;
+    }
     let compared_rows = match (&recorded.folder, &rows) {
         (Some(folder), Some(rows)) => rows.compare(folder)?,
         _ => 0,
