@@ -2,9 +2,7 @@
 
 use super::command::{LevelCommand, MethodCommand};
 use super::levels::FlightLevelRange;
-use super::performance::CLIMB_M_S;
-use super::performance::Performance;
-use super::segment::InterOrderSegment;
+use super::performance::{CLIMB_M_S, Performance};
 use serde::{Deserialize, Serialize};
 
 /// A change of level and speed beside the filed flight, kept for the whole horizon: the parts of an action beside its
@@ -103,13 +101,6 @@ pub struct FiledLevelSpeed {
     pub descent_m_s: f64,
     /// Airspeed in meters per second.
     pub v_m_s: f64,
-}
-
-impl From<&InterOrderSegment<'_>> for FiledLevelSpeed {
-    fn from(segment: &InterOrderSegment<'_>) -> Self {
-        let &InterOrderSegment { altitude_m, climb_m_s, descent_m_s, ref model, .. } = segment;
-        Self { altitude_m, climb_m_s, descent_m_s, v_m_s: model.v_m_s }
-    }
 }
 
 /// What an airplane flies now, and would fly by its filed flight.

@@ -1,6 +1,7 @@
 //! Segments of a flight: the flight between two orders.
 
 use super::airplane::AirplaneStart;
+use super::change::FiledLevelSpeed;
 use super::command::MethodCommand;
 use super::levels::FlightLevelRange;
 use super::motion::{AircraftModel, Point};
@@ -74,6 +75,13 @@ impl InterOrderSegment<'_> {
     /// Returns the levels that it is on in some seconds after `altitude_m`, if nothing holds it.
     pub(crate) fn levels_within(&self, altitude_m: f64, seconds: f64) -> FlightLevelRange {
         FlightLevelRange::between(altitude_m, self.altitude_after_m(altitude_m, seconds))
+    }
+}
+
+impl From<&InterOrderSegment<'_>> for FiledLevelSpeed {
+    fn from(segment: &InterOrderSegment<'_>) -> Self {
+        let &InterOrderSegment { altitude_m, climb_m_s, descent_m_s, ref model, .. } = segment;
+        Self { altitude_m, climb_m_s, descent_m_s, v_m_s: model.v_m_s }
     }
 }
 
