@@ -18,7 +18,7 @@
 //! does the shield: its clearances are a link of its own. Of *non-cooperative* airplanes a group knows the latest report
 //! that any of it has received, because its members tell each other that, too.
 //!
-//! **The shield's promise** beside non-cooperative airplanes rests on where they can be ([`crate::avoid`]). The bound on
+//! **The shield's promise** beside non-cooperative airplanes rests on where they can be (`src/avoid.rs`). The bound on
 //! the error of a track grows with its age `a`: since the report the airplane may have flown `s a` at its greatest speed
 //! `s` in the common air, which contains the largest drift of any air by any rule of the scenario, and the track was
 //! moved on by `v a` at the reported velocity; where rules change the common wind, that has carried it by up to `w a`
