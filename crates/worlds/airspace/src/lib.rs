@@ -15,7 +15,7 @@
 //!            measures/: definitions of conflict, well clear, fuel
 //! pilot      pilot/: an aircraft from percept to control        world.rs (immutable)    decide.rs: candidates
 //! act        perceive.rs -> join.rs -> act.rs: one cycle of dt  state.rs (mutable)    deploy/: pilots on a network in memory
-//!            encounters/: conflicts, losses and violations of pairs in a run
+//!            encounters/: conflicts, losses and violations of pairs in a run    surveillance/: reports and tracks of each observer
 //! run        scenario.rs, world_impl.rs, view.rs, ...           what a run, a file or a caller needs of it
 //! ```
 
