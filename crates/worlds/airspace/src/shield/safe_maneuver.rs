@@ -8,6 +8,7 @@ use crate::flight::{Frame, PairPlane, Point, Pose2, distance_m};
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::geometry::{add_scaled, norm, sub};
 use sidestep_kernel::interrupt;
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 /// Motion for one `dt`: a turn rate per step of `dtau`.
@@ -54,6 +55,19 @@ pub(super) enum PlanSource {
     Fallback,
 }
 
+impl PlanSource {
+    /// Returns a number that no other source of the airplane has.
+    pub(super) fn number(self) -> u32 {
+        match self {
+            Self::Common => 0,
+            Self::Fallback => 1,
+            Self::Candidate(k) => {
+                u32::try_from(k + 2).expect("fewer candidates than fit into memory")
+            }
+        }
+    }
+}
+
 /// The motion of one `dt`, and a fallback on which the airplane waits after that.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SafeManeuver {
@@ -61,8 +75,9 @@ pub(crate) struct SafeManeuver {
     motion: Arc<ProfileMotion>,
     /// What `path` is the path of.
     fallback: Fallback,
-    /// The path after `dt`.
-    path: FallbackPath,
+    /// The path after `dt`, computed when it is asked for: of many plans it is known already with which ones they are
+    /// compatible.
+    path: OnceCell<FallbackPath>,
     pub(super) source: PlanSource,
 }
 
@@ -158,8 +173,14 @@ impl SafeManeuver {
     }
 
     fn from_motion(motion: Arc<ProfileMotion>, fallback: Fallback) -> Self {
-        let path = motion.aircraft.fallback_path_from(motion.end_pose(), fallback);
-        Self { motion, fallback, path, source: PlanSource::Fallback }
+        Self { motion, fallback, path: OnceCell::new(), source: PlanSource::Fallback }
+    }
+
+    fn path(&self) -> &FallbackPath {
+        let motion = &self.motion;
+        self.path.get_or_init(|| {
+            motion.aircraft.fallback_path_from(motion.end_pose(), self.fallback)
+        })
     }
 
     /// Returns the same plan with another fallback.
@@ -198,7 +219,7 @@ impl SafeManeuver {
 
     /// Returns whether two plans stay apart during `dt` and on the fallbacks forever after it.
     pub(crate) fn is_compatible(&self, other: &Self) -> bool {
-        let lead_s = [self, other].map(|plan| plan.path.lead_s());
+        let lead_s = [self, other].map(|plan| plan.path().lead_s());
         let own = self.aircraft();
         let others = other.aircraft();
         if !own.is_protected_from(others) || !own.can_come_too_near(others, lead_s) {
@@ -210,7 +231,7 @@ impl SafeManeuver {
             return self.is_compatible_in_shear(other, gap_m);
         }
         let plane = own.pair_plane(others);
-        let [path, other_path] = FallbackPath::both_in_plane(&plane, [self.path, other.path]);
+        let [path, other_path] = FallbackPath::both_in_plane(&plane, [*self.path(), *other.path()]);
         path.stays_apart(&other_path, gap_m)
             && self.motion.stays_apart(&other.motion, &plane, gap_m)
     }
@@ -223,7 +244,7 @@ impl SafeManeuver {
         }
         let own = self.aircraft();
         let others = other.aircraft();
-        let conflict_s = own.path_conflict_with_s(self.path, others, other.path);
+        let conflict_s = own.path_conflict_with_s(*self.path(), others, *other.path());
         conflict_s == f64::INFINITY
             || conflict_s >= own.fallback_conflict_with_s(own.fallback, others, others.fallback)
     }
@@ -241,7 +262,7 @@ impl SafeManeuver {
         let gap_m = radius_m + aircraft.required_gap_m(other);
         // Between two poses it is within half a step of one of them.
         let half_step_m = 0.5 * aircraft.v_m_s * dtau_s;
-        let orbit = self.path.orbit();
+        let orbit = self.path().orbit();
         centers.iter().all(|&center| {
             let are_poses_clear =
                 poses.iter().all(|pose| plane.distance_m(pose.at, center) >= gap_m + half_step_m);
@@ -260,7 +281,7 @@ impl SafeManeuver {
     pub(super) fn pieces(&self) -> impl Iterator<Item = PathPiece> {
         let ProfileMotion { omegas_rad_s, dtau_s, .. } = &*self.motion;
         let motion_s = omegas_rad_s.len() as f64 * dtau_s;
-        self.motion_pieces().into_iter().chain(self.path.pieces(motion_s))
+        self.motion_pieces().into_iter().chain(self.path().pieces(motion_s))
     }
 
     /// Returns the number of the candidate, if it is one.

@@ -11,6 +11,7 @@ use rustc_hash::FxHashMap;
 use sidestep_kernel::EntityId;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::hash::{Hash, Hasher};
 
 /// The plan that the shield gives an airplane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,6 +155,8 @@ struct ShieldSearch<'a> {
     near: Vec<Vec<usize>>,
     /// Whether two plans are compatible, as far as it was asked; only looked up, never iterated.
     answers: RefCell<FxHashMap<[PlanKey; 2], bool>>,
+    /// The airplane that was in the way of a plan when that was asked last: it is mostly still there. Only looked up, too.
+    last_in_the_way: RefCell<FxHashMap<PlanKey, usize>>,
 }
 
 /// What an airplane may fly beside areas.
@@ -203,16 +206,26 @@ fn preferred_numbers(
 }
 
 /// A plan among those of a group.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct PlanKey {
-    airplane: usize,
-    source: PlanSource,
+    airplane: u32,
+    /// See [`PlanSource::number`].
+    source: u32,
     fallback: u16,
 }
 
 impl PlanKey {
     fn new(airplane: usize, plan: &SafeManeuver) -> Self {
-        Self { airplane, source: plan.source, fallback: plan.fallback().into() }
+        let airplane = u32::try_from(airplane).expect("fewer airplanes than fit into memory");
+        Self { airplane, source: plan.source.number(), fallback: plan.fallback().into() }
+    }
+}
+
+// In two words, because most of a dense search is looking up answers.
+impl Hash for PlanKey {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        state.write_u64(u64::from(self.airplane) << 32 | u64::from(self.source));
+        state.write_u16(self.fallback);
     }
 }
 
@@ -266,6 +279,7 @@ impl<'a> ShieldSearch<'a> {
             by_rank,
             near,
             answers: RefCell::default(),
+            last_in_the_way: RefCell::default(),
         };
         for i in 0..group.len() {
             let first = search.candidate_numbers(i).next();
@@ -311,6 +325,10 @@ impl<'a> ShieldSearch<'a> {
         j: usize,
         other: &SafeManeuver,
     ) -> bool {
+        // Each pair is asked for from both sides.
+        if i > j {
+            return self.is_compatible_with_plan(j, other, i, plan);
+        }
         // The search asks for some of them again and again, and no answer depends on any other plan.
         let asked = [PlanKey::new(i, plan), PlanKey::new(j, other)];
         if let Some(&answer) = self.answers.borrow().get(&asked) {
@@ -323,6 +341,25 @@ impl<'a> ShieldSearch<'a> {
                     && self.settled_plans(i).all(|settled| settled.is_compatible(other))));
         self.answers.borrow_mut().insert(asked, answer);
         answer
+    }
+
+    /// Returns an airplane with which a plan of airplane `i` is incompatible, where `plan_of` are the plans of the others.
+    fn find_in_the_way<'p>(
+        &'p self,
+        i: usize,
+        plan: &SafeManeuver,
+        plan_of: impl Fn(usize) -> &'p SafeManeuver,
+    ) -> Option<usize> {
+        let is_in_the_way = |j: usize| !self.is_compatible_with_plan(i, plan, j, plan_of(j));
+        let key = PlanKey::new(i, plan);
+        // Few plans change between two questions, so one answer takes the place of dozens.
+        let last = self.last_in_the_way.borrow().get(&key).copied();
+        if let Some(j) = last.filter(|&j| is_in_the_way(j)) {
+            return Some(j);
+        }
+        let found = self.near[i].iter().copied().find(|&j| is_in_the_way(j))?;
+        self.last_in_the_way.borrow_mut().insert(key, found);
+        Some(found)
     }
 
     /// Returns what an airplane may fly without the consent of others.
@@ -390,16 +427,15 @@ impl<'a> ShieldSearch<'a> {
     /// they are set to the other side, neither of them can change alone.
     fn with_other_fallbacks(&self, i: usize, plan: &SafeManeuver) -> Option<PlanChanges> {
         self.fallback_choices(i, plan).find_map(|fallback| {
-            let mut changes: PlanChanges = [(i, plan.with_fallback(fallback))].into();
-            let in_the_way: Vec<usize> = self.near[i]
-                .iter()
-                .copied()
-                .filter(|&j| !self.is_compatible(i, &changes[&i], j))
-                .collect();
-            if in_the_way.iter().any(|&j| self.plans[j].is_settled()) {
+            let plan = plan.with_fallback(fallback);
+            // Those that change nothing are asked first: mostly the question ends with one of them.
+            let is_settled = |j: &usize| self.plans[*j].is_settled();
+            let in_the_way = |j: &usize| !self.is_compatible(i, &plan, *j);
+            if self.near[i].iter().filter(|j| is_settled(j)).any(|j| in_the_way(j)) {
                 return None;
             }
-            for j in in_the_way {
+            let mut changes: PlanChanges = [(i, plan.clone())].into();
+            for &j in self.near[i].iter().filter(|j| !is_settled(j) && in_the_way(j)) {
                 let other = self.fallback_beside(j, &changes)?;
                 changes.insert(j, other);
             }
@@ -412,11 +448,9 @@ impl<'a> ShieldSearch<'a> {
     fn fallback_beside(&self, j: usize, changes: &PlanChanges) -> Option<SafeManeuver> {
         self.fallback_choices(j, &self.plans[j]).find_map(|fallback| {
             let plan = self.plans[j].with_fallback(fallback);
-            let is_compatible_with_all = self.near[j].iter().all(|&k| {
-                let other = changes.get(&k).unwrap_or(&self.plans[k]);
-                self.is_compatible_with_plan(j, &plan, k, other)
-            });
-            is_compatible_with_all.then_some(plan)
+            let plan_of = |k: usize| changes.get(&k).unwrap_or(&self.plans[k]);
+            let in_the_way = self.find_in_the_way(j, &plan, plan_of);
+            in_the_way.is_none().then_some(plan)
         })
     }
 
@@ -449,7 +483,7 @@ impl<'a> ShieldSearch<'a> {
     }
 
     fn is_compatible_with_all(&self, i: usize, plan: &SafeManeuver) -> bool {
-        self.near[i].iter().all(|&j| self.is_compatible(i, plan, j))
+        self.find_in_the_way(i, plan, |j| &self.plans[j]).is_none()
     }
 
     /// Lets those that do not fly their first candidate try better ones once more, by falling rank, as long as that helps
