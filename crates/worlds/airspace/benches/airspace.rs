@@ -157,7 +157,7 @@ fn exact() {
     };
     for (name, horizon, legs, inflation, cooling) in [
         ("the paper's actions", 125, DetourAlternatives::default(), 1.05, 0.8),
-        ("the default preset", 90, DetourAlternatives::default_preset(), 1.12, 0.5),
+        ("the default preset", 100, DetourAlternatives::default_preset(), 1.08, 0.5),
     ] {
         let objective = preset(inflation);
         let conflict = Conflict::new(10, horizon, &legs, objective);

@@ -28,7 +28,7 @@ const MAX_NODES: u64 = 100_000;
 /// Added to both costs of a ratio, which has no sense where the least cost is 0.
 const TINY: f64 = 1e-6;
 
-const TIMING: TimeDiscretization = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 90 };
+const TIMING: TimeDiscretization = TimeDiscretization { dt_s: 5.0, dtau_s: 1.0, horizon: 100 };
 
 fn draws(game: u32, n: u32, purpose: u16) -> Draws {
     Streams::new(Seed(u64::from(n))).draws(game, 0, Purpose(purpose))
@@ -45,7 +45,7 @@ fn random_game(n: u32, number: u32) -> PairwiseGame {
     let objective = Objective {
         alpha: 0.001,
         beta: 0.995,
-        inflation: 1.12,
+        inflation: 1.08,
         mask: true,
         vertical_m: 300.0,
         level_weight: 1.0,

@@ -20,6 +20,7 @@ pub(super) use group_game::{add_pair_costs, own_costs};
 use super::flight::{PairPlane, Point, Prediction};
 use super::non_cooperative::NonCooperativeAircraft;
 use serde::{Deserialize, Serialize};
+use sidestep_kernel::geometry::{norm_squared, sub};
 use slices::SLICE;
 
 /// The weights of separation and deviation.
@@ -153,13 +154,15 @@ impl Objective {
     /// Returns `Gdev_i`, from the ends of a prediction and of the optimal one (eq. 10).
     pub fn deviation_cost(&self, of: &Prediction, optimal: &Prediction) -> f64 {
         match (of.points.last(), optimal.points.last()) {
-            (Some(p), Some(q)) => {
-                let dx = p[0] - q[0];
-                let dy = p[1] - q[1];
-                dx * dx + dy * dy
-            }
+            (Some(p), Some(q)) => norm_squared(sub(*p, *q)),
             _ => 0.0,
         }
+    }
+
+    /// Returns the same where two predictions are farthest from each other: the largest square of a deviation.
+    pub fn max_deviation_cost(&self, of: &Prediction, optimal: &Prediction) -> f64 {
+        let pairs = of.points.iter().zip(&optimal.points);
+        pairs.map(|(p, q)| norm_squared(sub(*p, *q))).fold(0.0, f64::max)
     }
 }
 

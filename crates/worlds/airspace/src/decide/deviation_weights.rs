@@ -14,7 +14,8 @@ impl AirspaceWorld {
     /// Returns the factor on the cost of deviations of each airplane of a group, by places that all see.
     ///
     /// It is that of its priority; and by a rule it is greater for one that has right of way in some conflict,
-    /// and has to give way in none. Conflicts are those of present velocities within the horizon.
+    /// and has to give way in none. Conflicts are those within the horizon of airplanes that head for their way-points, or
+    /// else of present velocities.
     pub(crate) fn deviation_weights(&self, group: &[KnownAircraft]) -> Vec<f64> {
         if !self.uses_right_of_way {
             return vec![1.0; group.len()];
@@ -23,12 +24,17 @@ impl AirspaceWorld {
         let filed: Vec<KnownAircraft> =
             group.iter().map(|known| KnownAircraft { next: 0, orders: 0, ..*known }).collect();
         let traffic = TrafficView::from_filed_group(self, &filed);
+        let proceeding = traffic.proceeding();
         let mut has_right = vec![false; group.len()];
         let mut gives_way = vec![false; group.len()];
         if self.right_of_way != RightOfWayRule::None {
             for i in 0..group.len() {
                 for j in i + 1..group.len() {
-                    match traffic.yielding_in_conflict(i, j) {
+                    // One that has turned away already still gives way, or its right would end with the first turn.
+                    let yielding = proceeding
+                        .yielding_in_conflict(i, j)
+                        .or_else(|| traffic.yielding_in_conflict(i, j));
+                    match yielding {
                         Some(Yielding::First) => (has_right[j], gives_way[i]) = (true, true),
                         Some(Yielding::Second) => (has_right[i], gives_way[j]) = (true, true),
                         Some(Yielding::Both) | None => {}

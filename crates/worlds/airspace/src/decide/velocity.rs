@@ -19,7 +19,7 @@ use crate::purpose;
 use crate::right_of_way::Yielding;
 use crate::shield::TurnProfile;
 use crate::world::AirspaceWorld;
-use sidestep_kernel::geometry::{add, sub};
+use sidestep_kernel::geometry::{add, norm, sub};
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, math};
 
@@ -207,6 +207,21 @@ impl<'a> TrafficView<'a> {
     fn new(world: &'a AirspaceWorld, all: Vec<AircraftState>) -> Self {
         let frames = all.iter().map(|one| world.surface.frame_at(one.at)).collect();
         Self { world, all, frames }
+    }
+
+    /// Returns the same airplanes if each headed for its way-point.
+    pub(super) fn proceeding(&self) -> Self {
+        let proceed = |one: &AircraftState| {
+            let speed_m_s = norm(one.velocity);
+            let [east, north] = [math::cos(one.preferred_rad), math::sin(one.preferred_rad)];
+            AircraftState {
+                heading_rad: one.preferred_rad,
+                velocity: [speed_m_s * east, speed_m_s * north],
+                ..*one
+            }
+        };
+        let all = self.all.iter().map(proceed).collect();
+        Self { world: self.world, all, frames: self.frames.clone() }
     }
 
     fn is_on_level(&self, a: usize, b: usize) -> bool {

@@ -111,7 +111,7 @@ fn where_nobody_talks_levels_and_speeds_are_seen_and_all_are_kept_apart() {
             format!("vertical_m = 150.0\nlevel_weight = 0.01\nmax_rounds = 20\n{agents}");
         let keys = "level_changes_m = [-160.0, 160.0]\nspeed_changes_m_s = [-5.0, 5.0]";
         let unordered = crossing(keys).replace("orders = [", "# orders = [");
-        let (_, metrics, _) = flown(run(&airspace, &unordered), 90);
+        let (_, metrics, _) = flown(run(&airspace, &unordered), 300);
         assert_eq!((metrics.losses_of_separation, metrics.arrived), (0, 4), "{agents}");
     }
 }

@@ -52,7 +52,15 @@ pub(crate) fn own_costs(objective: &Objective, options: &ActionPredictions) -> V
     let mut costs: Vec<f64> = options
         .predictions
         .iter()
-        .map(|prediction| alpha * objective.deviation_cost(prediction, optimal))
+        .map(|prediction| {
+            // One that has right of way keeps its way: it is not enough that it is back on it at the end.
+            let deviation = if options.deviation_weight > 1.0 {
+                objective.max_deviation_cost(prediction, optimal)
+            } else {
+                objective.deviation_cost(prediction, optimal)
+            };
+            alpha * deviation
+        })
         .collect();
     if let Some(changes) = &options.changes {
         for (action, cost) in costs.iter_mut().enumerate() {

@@ -488,7 +488,7 @@ impl<'a> Compiler<'a> {
             return Err(self.source.error(former.span(), cause, remedy));
         }
         // The paper predicts 125 points of one second each.
-        let preset_s: f64 = if self.is_paper_preset() { 125.0 } else { 90.0 };
+        let preset_s: f64 = if self.is_paper_preset() { 125.0 } else { 100.0 };
         let given = section.horizon_s.as_ref();
         let horizon_s = given.map_or(preset_s.max(dt_s), |h| h.get_ref().get());
         // A time that rounding puts behind a point ends at that point.

@@ -242,7 +242,7 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_nothing_is_taken() {
         (changed(&|control| control.maneuver = profile(vec![9.0; 5])), "a turn rate of 9"),
         (
             changed(&|control| control.maneuver = falls_back_far_away.clone()),
-            "orbits after 100 cycles; give one that does after at most 11",
+            "orbits after 100 cycles; give one that does after at most 13",
         ),
         (
             changed(&|control| control.maneuver = profile(vec![0.001; 5])),
