@@ -74,6 +74,11 @@ mod tests {
                 prop_assert!(2.0 * (flat_m - true_m).abs() <= margin_m, "{flat_m} {true_m} {margin_m}");
             }
         }
+    }
+
+    proptest! {
+        // Each flies thousands of steps.
+        #![proptest_config(ProptestConfig::with_cases(200))]
 
         /// An orbit that is flown for days from frame to frame is still the same circle, at the same phase.
         #[test]

@@ -21,6 +21,9 @@ use std::collections::BTreeSet;
 /// tenth of a second. In 1,500 dense random groups and in 200 mornings of departures no search came to it
 /// (the tests below, and `terminal_tests.rs`).
 const MAX_STEPS: u32 = 10_000;
+/// Largest number of steps of the searches for all pairs of a group in one cycle: about a second. Only a heap of
+/// airplanes within each other's separation comes to it, in which no search finds anything.
+const MAX_GROUP_STEPS: u32 = 100_000;
 /// Largest number of airplanes that are decided at the same time: a bound on the depth of the recursion.
 const MAX_DECIDED: usize = 60;
 
@@ -71,6 +74,8 @@ pub(super) struct JointSearch<'a> {
     steps: u32,
     /// See [`MAX_STEPS`].
     max_steps: u32,
+    /// Steps that are left of [`MAX_GROUP_STEPS`].
+    group_steps_left: u32,
     /// Whether a search has come to a limit.
     is_limited: bool,
 }
@@ -103,6 +108,7 @@ impl<'a> JointSearch<'a> {
             allowed: BTreeSet::new(),
             steps: 0,
             max_steps: MAX_STEPS,
+            group_steps_left: MAX_GROUP_STEPS,
             is_limited: false,
         }
     }
@@ -128,9 +134,11 @@ impl<'a> JointSearch<'a> {
         self.allowed.remove(&pair);
         self.pair = pair;
         self.steps = 0;
+        self.max_steps = self.max_steps.min(self.group_steps_left);
         self.is_limited = false;
         let before = self.present.clone();
         let is_found = self.repair();
+        self.group_steps_left = self.group_steps_left.saturating_sub(self.steps);
         for i in std::mem::take(&mut self.decided) {
             self.is_decided[i] = false;
         }
@@ -441,6 +449,9 @@ mod tests {
             .flat_map(|(i, others)| others.iter().filter(move |&&j| i < j).map(move |&j| (i, j)));
         let pair = pairs.find(|&(i, j)| !search.is_pair_apart((i, j))).expect("a dense group");
         search.max_steps = 0;
+        assert_eq!(search.find(pair, &BTreeSet::new()), JointOutcome::Unknown);
+        search.max_steps = MAX_STEPS;
+        search.group_steps_left = 0;
         assert_eq!(search.find(pair, &BTreeSet::new()), JointOutcome::Unknown);
         assert!((0..group.len()).all(|i| search.fallback(i) == fallbacks[i]));
     }

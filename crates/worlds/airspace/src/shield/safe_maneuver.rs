@@ -178,9 +178,8 @@ impl SafeManeuver {
 
     fn path(&self) -> &FallbackPath {
         let motion = &self.motion;
-        self.path.get_or_init(|| {
-            motion.aircraft.fallback_path_from(motion.end_pose(), self.fallback)
-        })
+        self.path
+            .get_or_init(|| motion.aircraft.fallback_path_from(motion.end_pose(), self.fallback))
     }
 
     /// Returns the same plan with another fallback.
