@@ -352,17 +352,13 @@ impl<const D: usize> MotionContext<'_, D> {
         // turn.
         let reach_m = length_m + step.rod.radius_m.max(step.tip_radius_m) + 2.0 * SKIN_M;
         scratch.blocks.clear();
-        let rod = step.master.min(step.slave);
-        self.visit_blocking_parts(
-            &bounds_around(step.mn, reach_m),
-            Some(rod),
-            step.slave,
-            |block| {
-                if !block.core.is_clear_of_point(step.mn, reach_m + block.radius_m) {
-                    scratch.blocks.push(*block);
-                }
-            },
-        );
+        let near = bounds_around(step.mn, reach_m);
+        self.visit_blocking_parts(&near, &step.moving_part(), |block| {
+            let touch_m = length_m + block.max_separation_m() + 2.0 * SKIN_M;
+            if !block.core.is_clear_of_point(step.mn, touch_m) {
+                scratch.blocks.push(*block);
+            }
+        });
     }
 }
 
@@ -382,8 +378,8 @@ impl<const D: usize> RodObstacleHit<D> {
         guided: Point<D>,
         block: &BlockingPart<D>,
     ) -> Option<Self> {
+        let radius_m = block.rod_separation_m?;
         let nearest = block.core.nearest_to_segment([step.mn, guided]);
-        let radius_m = block.radius_m + step.rod.radius_m;
         (nearest.distance_m < radius_m).then(|| Self {
             on_core: nearest.on_core,
             radius_m,
@@ -452,8 +448,9 @@ fn keep_informative_veto(informative: &mut Option<IncompleteVeto>, objection: In
 }
 
 fn contains_master<const D: usize>(step: &SlaveStep<D>, block: &BlockingPart<D>) -> bool {
-    let radius_m = block.radius_m + step.rod.radius_m;
-    block.stops_rod && block.core.nearest_to_point(step.mn).distance_m < radius_m
+    block
+        .rod_separation_m
+        .is_some_and(|rod_m| block.core.nearest_to_point(step.mn).distance_m < rod_m)
 }
 
 fn sort<const D: usize>(step: &SlaveStep<D>, found: &mut [CandidatePosition<D>]) {
@@ -515,27 +512,31 @@ impl<const D: usize> PlanarDirectionSearch<'_, D> {
 
     fn intersects_blocking_part(&self, s: Point<D>, block: &BlockingPart<D>) -> bool {
         // More than the skin in the arcs, so that no direction in an arc looks free by rounding.
-        let near_m = block.radius_m + 2.0 * SKIN_M;
+        let near_m = 2.0 * SKIN_M;
         let rod = [self.step.mn, s];
-        block.stops_rod && !block.core.is_clear_of_segment(rod, near_m + self.step.rod.radius_m)
-            || block.stops_tip && !block.core.is_clear_of_point(s, near_m + self.step.tip_radius_m)
+        let core = &block.core;
+        block.rod_separation_m.is_some_and(|rod_m| !core.is_clear_of_segment(rod, rod_m + near_m))
+            || block
+                .tip_separation_m
+                .is_some_and(|tip_m| !core.is_clear_of_point(s, tip_m + near_m))
     }
 
     fn add_blocked_arcs(&self, block: &BlockingPart<D>, known: &mut BlockedArcs) {
-        let step = self.step;
-        let reach = RodTurnCircle { master: to_plane(step.mn), length_m: self.length_m };
+        let reach = RodTurnCircle { master: to_plane(self.step.mn), length_m: self.length_m };
         let core = project_core_to_plane(&block.core);
-        let apart_m = core.nearest_to_point(reach.master).distance_m;
-        let rod_m = block.radius_m + step.rod.radius_m;
-        // If the master is within the skin of a surface, the half-plane behind it is blocked; with the
-        // whole skin it would count as inside.
-        let skinned_m = if apart_m >= rod_m { (rod_m + SKIN_M).min(apart_m) } else { rod_m };
-        if block.stops_rod && !block_rod(&reach, &core, skinned_m, &mut known.arcs) {
-            known.inside = Some(known.inside.map_or(block.name, |name| name.min(block.name)));
+        if let Some(rod_m) = block.rod_separation_m {
+            let apart_m = core.nearest_to_point(reach.master).distance_m;
+            // If the master is within the skin of a surface, the half-plane behind it is blocked; with the
+            // whole skin it would count as inside.
+            let skinned_m = if apart_m >= rod_m { (rod_m + SKIN_M).min(apart_m) } else { rod_m };
+            if !block_rod(&reach, &core, skinned_m, &mut known.arcs) {
+                known.inside = Some(known.inside.map_or(block.name, |name| name.min(block.name)));
+            }
         }
-        if block.stops_tip && (!block.stops_rod || step.tip_radius_m > step.rod.radius_m) {
-            let tip_m = block.radius_m + step.tip_radius_m + SKIN_M;
-            add_tip_blocked_arcs(&reach, &core, tip_m, &mut known.arcs);
+        // Arcs of a connector no thicker than its rod lie within those of the rod.
+        let is_thicker = block.tip_separation_m > block.rod_separation_m;
+        if let Some(tip_m) = block.tip_separation_m.filter(|_| is_thicker) {
+            add_tip_blocked_arcs(&reach, &core, tip_m + SKIN_M, &mut known.arcs);
         }
     }
 }

@@ -6,7 +6,7 @@
 use super::geometry::{self, Point, angle_between_rad, distance, dot, norm, sub};
 use super::veto::VetoReason;
 use sidestep_kernel::InputError;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 /// Tolerance of the rods' lengths, meters. One motion keeps lengths to about 1e-14 m, so a tolerance far above rounding
 /// refuses no motion, and errors of many motions do not add up because each one sets the length anew.
@@ -162,6 +162,8 @@ struct FixedMeasures {
     max_rod_m: f64,
     min_size_m: f64,
     max_radius_m: f64,
+    max_rod_radius_m: f64,
+    min_rod_m: f64,
 }
 
 impl<const D: usize> Chain<D> {
@@ -221,7 +223,13 @@ impl<const D: usize> Chain<D> {
         let radii = connectors.iter().map(|c| c.radius_m).filter(|&r| r > 0.0);
         let min_size_m = smallest_part_m(&rods, radii);
         let max_radius_m = connectors.iter().map(|c| c.radius_m).fold(0.0, f64::max);
-        let measures = FixedMeasures { max_rod_m, min_size_m, max_radius_m };
+        let measures = FixedMeasures {
+            max_rod_m,
+            min_size_m,
+            max_radius_m,
+            max_rod_radius_m: rods.iter().map(|rod| rod.radius_m).fold(0.0, f64::max),
+            min_rod_m: rods.iter().map(|rod| rod.min_m).fold(f64::INFINITY, f64::min),
+        };
         Ok(Self { points, connectors, rods, special, measures })
     }
 
@@ -343,6 +351,21 @@ impl<const D: usize> Chain<D> {
     /// Returns the greatest radius of any part, meters; no rod is thicker than its connectors.
     pub(super) fn max_radius_m(&self) -> f64 {
         self.measures.max_radius_m
+    }
+
+    /// Returns a distance by which each rod of a stretch must lead forward along some direction, so that no two of its
+    /// parts touch, meters. It makes room for a connector and a rod with one rod between them; two rods are no thicker,
+    /// and between two connectors there are two rods.
+    pub(super) fn neighbor_separation_m(&self) -> f64 {
+        self.measures.max_radius_m + self.measures.max_rod_radius_m
+    }
+
+    /// Returns whether parts near each other along the chain keep their distances at every bend of up to a right angle:
+    /// with one rod between them they are as far apart as it is long, and the ends of two rods the diagonal of a square.
+    pub(super) fn clears_right_angles(&self) -> bool {
+        let diagonal_m = SQRT_2 * self.measures.min_rod_m;
+        self.neighbor_separation_m() <= self.measures.min_rod_m
+            && 2.0 * self.measures.max_radius_m <= diagonal_m
     }
 
     /// Returns whether every connector is free and bends without limit.

@@ -381,6 +381,14 @@ impl<const D: usize> Aabb<D> {
         contains
     }
 
+    /// Returns the distance between the boxes, meters; 0 where they touch.
+    pub fn distance_m(&self, other: &Self) -> f64 {
+        let apart: Point<D> = std::array::from_fn(|i| {
+            (self.lo[i] - other.hi[i]).max(other.lo[i] - self.hi[i]).max(0.0)
+        });
+        norm(apart)
+    }
+
     /// Returns whether the boxes touch.
     #[inline]
     pub fn intersects(&self, other: &Self) -> bool {

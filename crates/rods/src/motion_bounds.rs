@@ -1,32 +1,93 @@
 //! Proof that a motion brings no two parts of a chain near each other, without a test of each pair.
 //!
-//! The idea is that of conservative advancement and of Verlet lists. The clearance of every rod from all
-//! parts that may not touch it has been measured at some time. Since then none has come nearer by more
-//! than twice the longest travel of any connector, which an odometer sums up. Only rods whose clearance
-//! is used up are measured again; most need not be for many motions.
+//! Parts near each other along the chain are never far apart, so no distance proves anything about them; but as long as
+//! all rods of a stretch point forward along one direction, its parts follow each other in that direction and cannot meet,
+//! however far they move ([`is_monotone`]). That takes a few products per rod.
+//!
+//! For parts farther along, the idea is that of conservative advancement and of Verlet lists. The gap between a part and
+//! all others has been measured at some time. Since then none has come nearer by more than twice the longest travel of
+//! any connector, which an odometer sums up. Only parts whose gap is used up are measured again; most need not be for
+//! many motions. Blocks of rods are measured by their boxes, and single rods only where those do not suffice.
+//!
+//! Whether a proof succeeds follows from the motion alone, never from what was measured before: a gap that is not used
+//! up would suffice if it were measured again.
 
 use super::chain::Chain;
-use super::geometry::{Aabb, Point, add, between_segments, distance, dot, nearest_on_segment, sub};
+use super::geometry::{Aabb, Point, add, between_segments, distance, dot, norm, sub};
+use super::motion_context::contact_distance_m;
+use super::own_body::{ChainPart, part_pairs};
 use super::rod_bvh::RodBvh;
+use super::sweep::{RodPairSweep, RodSweep};
+use std::ops::Range;
 
-/// Index distance of rods between which no distance is measured: they touch by construction, or nearly
-/// so.
-const NEIGHBORS: usize = 2;
 /// Distance that is kept beyond the one needed, meters: far more than rounding.
 const MARGIN_M: f64 = 1e-8;
-/// Distance up to which parts are searched, in lengths of the longest rod: a longer search finds more
+/// Part of it that a gap measured earlier must have left, meters: far more than rounding, so that it would also suffice if
+/// it were measured now.
+const SLACK_M: f64 = 1e-9;
+/// Distance up to which other parts are searched, in lengths of the longest rod or block: a longer search finds more
 /// parts, a shorter one is soon repeated. The value trades these off, and was not tuned.
 const SEARCH_LENGTHS: f64 = 1.5;
-/// Least number of rods for which it is worth the effort: a shorter chain has few pairs to test, and fewer than three
-/// rods have none whose distance is measured. The value was not tuned.
-const MIN_RODS: usize = 8;
 /// Reading at which the odometer starts again, meters, long before rounding matters.
 const MAX_ODOMETER_M: f64 = 1e5;
-/// Travel after which the tree is built anew, as a fraction of the distance searched: queries grow by the
+/// Travel after which a tree is built anew, as a fraction of the distance searched: queries grow by the
 /// travel since.
 const STALE_FRACTION: f64 = 0.25;
+/// Rods of a block. Larger blocks make fewer, but their boxes meet others sooner where the chain bends. Not tuned.
+const BLOCK: usize = 16;
+/// Rods of a stretch whose parts are proven apart by one direction, a number of blocks.
+const STRETCH: usize = 4 * BLOCK;
+/// Rods from the start of a stretch to that of the next: they share a block, so that each block and the next one belong
+/// to a common stretch.
+const STRIDE: usize = STRETCH - BLOCK;
 
-/// Distances of a chain's rods from all parts that can be in their way, with the travel since.
+/// A motion that was made and is to be proven.
+#[derive(Debug, Clone)]
+pub(super) struct ProvenMotion {
+    /// The connectors that moved.
+    pub(super) moved: Range<usize>,
+    /// Longest travel of any of them, meters.
+    pub(super) travel_m: f64,
+    /// Whether the proof is to hold for parts that move one after the other as well, as reactions are checked: only then
+    /// would these checks have made the same motion.
+    pub(super) in_turn: bool,
+}
+
+/// Gaps of elements (rods, or blocks of them) from all others, with the travel since.
+#[derive(Debug, Clone, Default)]
+struct GapBudget<const D: usize> {
+    /// The odometer's reading at which another element could touch each one.
+    until_m: Vec<f64>,
+    /// Boxes of the elements without thickness, and the odometer's reading when they were right.
+    tree: RodBvh<D>,
+    built_at_m: f64,
+}
+
+impl<const D: usize> GapBudget<D> {
+    fn reset(&mut self, elements: usize) {
+        self.until_m.clear();
+        self.until_m.resize(elements, f64::NEG_INFINITY);
+        self.built_at_m = f64::NEG_INFINITY;
+    }
+
+    /// Visits the elements within `search_m` of a box, and perhaps some others.
+    fn visit_near(
+        &mut self,
+        near: &Aabb<D>,
+        search_m: f64,
+        odometer_m: f64,
+        bounds: impl Iterator<Item = Aabb<D>>,
+        visit_one: impl FnMut(usize),
+    ) {
+        if odometer_m - self.built_at_m > STALE_FRACTION * search_m {
+            self.tree.rebuild(bounds);
+            self.built_at_m = odometer_m;
+        }
+        self.tree.visit(&near.grown(search_m + odometer_m - self.built_at_m), visit_one);
+    }
+}
+
+/// Distances of a chain's parts from all others that can be in their way, with the travel since.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SeparationBounds<const D: usize> {
     /// Positions to which the odometer has counted.
@@ -34,19 +95,11 @@ pub(super) struct SeparationBounds<const D: usize> {
     /// Twice the sum of the longest travel of each motion so far, meters: two parts approach each other at
     /// most by the travel of both.
     odometer_m: f64,
-    /// The odometer's reading at which a part could touch each rod.
-    until_m: Vec<f64>,
-    /// Boxes of the rods without their thickness, and the odometer's reading when they were right.
-    tree: RodBvh<D>,
-    built_at_m: f64,
+    rods: GapBudget<D>,
+    blocks: GapBudget<D>,
 }
 
 impl<const D: usize> SeparationBounds<D> {
-    /// Returns whether a chain is long enough for this to be worth the effort.
-    pub(super) fn has_enough_rods(chain: &Chain<D>) -> bool {
-        chain.rods().len() >= MIN_RODS
-    }
-
     /// Records the positions of a chain, which may be another one or have been changed from outside.
     pub(super) fn record(&mut self, chain: &Chain<D>) {
         if self.points.len() != chain.points().len() || self.odometer_m > MAX_ODOMETER_M {
@@ -63,15 +116,15 @@ impl<const D: usize> SeparationBounds<D> {
     fn reset(&mut self, chain: &Chain<D>) {
         self.points.clear();
         self.points.extend_from_slice(chain.points());
-        self.until_m.clear();
-        self.until_m.resize(chain.rods().len(), f64::NEG_INFINITY);
         self.odometer_m = 0.0;
-        self.built_at_m = f64::NEG_INFINITY;
+        let rods = chain.rods().len();
+        self.rods.reset(rods);
+        self.blocks.reset(rods.div_ceil(BLOCK));
     }
 
-    /// Records that the chain stays where an allowed motion has brought it.
-    pub(super) fn accept(&mut self, chain: &Chain<D>) {
-        self.points.copy_from_slice(chain.points());
+    /// Records that the chain stays where an allowed motion has brought some of its connectors.
+    pub(super) fn accept(&mut self, chain: &Chain<D>, moved: Range<usize>) {
+        self.points[moved.clone()].copy_from_slice(&chain.points()[moved]);
     }
 
     /// Records that a motion of `travel_m` that was tested is taken back. Clearances measured at its end
@@ -89,50 +142,176 @@ impl<const D: usize> SeparationBounds<D> {
         &self.points
     }
 
-    /// Returns whether a motion from the recorded positions to where the chain is now, in which no connector
-    /// moved by more than `travel_m`, brings no two parts near each other, neither at its end nor on its
-    /// path.
-    pub(super) fn allows(&mut self, chain: &Chain<D>, travel_m: f64) -> bool {
-        self.add_travel(travel_m);
-        // Two diameters at rest; on the path both parts were up to the travel from where they are, and
-        // the test of paths adds it once more.
-        let needed_m = 2.0 * chain.max_radius_m() + 3.0 * travel_m + MARGIN_M;
-        for rod in 0..self.until_m.len() {
-            if self.until_m[rod] - self.odometer_m >= needed_m {
+    /// Returns whether a motion from the recorded positions to where the chain is now brings no two parts too near each
+    /// other, neither at its end nor on its path.
+    pub(super) fn allows(&mut self, chain: &Chain<D>, motion: &ProvenMotion) -> bool {
+        self.add_travel(motion.travel_m);
+        // On the path both parts were up to the travel from where they are at its end, and the test of paths adds it once
+        // more.
+        let needed_m = 3.0 * motion.travel_m + MARGIN_M;
+        let rods = chain.rods().len();
+        for stretch in stretches(rods) {
+            let has_moved = motion.moved.start <= stretch.end && stretch.start < motion.moved.end;
+            if has_moved
+                && (motion.in_turn || !self.is_monotone(chain, stretch.clone()))
+                && !(self.are_neighbors_apart(chain, stretch.clone())
+                    && self.are_rods_apart(chain, stretch, needed_m))
+            {
+                return false;
+            }
+        }
+        // In a single stretch all pairs have been seen.
+        rods <= STRETCH
+            || (0..rods.div_ceil(BLOCK)).all(|block| {
+                self.is_block_apart(chain, block, needed_m)
+                    || self.are_rods_apart(chain, block_rods(block, rods), needed_m)
+            })
+    }
+
+    /// Returns whether all rods of a stretch point forward along one direction, before the motion and after it, each by
+    /// more than the thickness of its parts. Then no two parts of the stretch meet: of any two, the later one is farther
+    /// along by at least one such distance. As the ends of the rods move straight, that holds on the whole way.
+    fn is_monotone(&self, chain: &Chain<D>, stretch: Range<usize>) -> bool {
+        let connectors = stretch.start..stretch.end + 1;
+        let before = &self.points[connectors.clone()];
+        let after = &chain.points()[connectors];
+        let along = sub(after[after.len() - 1], after[0]);
+        let advance = |points: &[Point<D>]| {
+            let advances = points.windows(2).map(|ends| dot(sub(ends[1], ends[0]), along));
+            advances
+                .fold(f64::INFINITY, |least, advance| if advance < least { advance } else { least })
+        };
+        let least = advance(after).min(advance(before));
+        least >= (chain.neighbor_separation_m() + MARGIN_M) * norm(along)
+    }
+
+    /// Returns whether the parts of a stretch that are near each other along the chain keep their distances, at the end of
+    /// the motion and on its path.
+    fn are_neighbors_apart(&self, chain: &Chain<D>, stretch: Range<usize>) -> bool {
+        let part_sweep = |part: ChainPart| RodSweep {
+            from: part.ends(&self.points),
+            to: part.ends(chain.points()),
+        };
+        let is_apart = |one: ChainPart, other: ChainPart| {
+            let Some(separation_m) = chain.min_separation_m(one, other) else { return true };
+            let pair = RodPairSweep { one: part_sweep(one), other: part_sweep(other) };
+            between_segments(pair.one.to, pair.other.to).distance_m
+                >= contact_distance_m(separation_m)
+                && pair.is_clear(separation_m)
+        };
+        let clears_right_angles = chain.clears_right_angles();
+        let mut was_open = false;
+        for k in stretch.start + 2..stretch.end + 1 {
+            let is_open = clears_right_angles && self.stays_open(chain, k - 1);
+            let are_open = is_open && (was_open || k == stretch.start + 2);
+            was_open = is_open;
+            if are_open {
                 continue;
             }
-            let clearance_m = self.measure_clearance_m(chain, rod, needed_m);
-            self.until_m[rod] = self.odometer_m + clearance_m;
-            if clearance_m < needed_m {
+            let connector = ChainPart::Connector(k);
+            let rod = ChainPart::Rod(k - 1);
+            let is_clear = is_apart(ChainPart::Rod(k - 2), connector)
+                && is_apart(ChainPart::Connector(k - 2), rod)
+                && is_apart(ChainPart::Connector(k - 2), connector)
+                && (k < stretch.start + 3 || is_apart(ChainPart::Rod(k - 3), rod));
+            if !is_clear {
                 return false;
             }
         }
         true
     }
 
-    /// Returns the distance of a rod from all parts that can be in its way, up to the distance
-    /// searched, meters.
-    fn measure_clearance_m(&mut self, chain: &Chain<D>, rod: usize, needed_m: f64) -> f64 {
-        let search_m = needed_m + SEARCH_LENGTHS * chain.max_rod_m();
-        if self.odometer_m - self.built_at_m > STALE_FRACTION * search_m {
-            let ends = chain.points().windows(2);
-            self.tree.rebuild(ends.map(Aabb::from_points));
-            self.built_at_m = self.odometer_m;
+    /// Returns whether the bend at a connector is a right angle at most, all the way: the product of the rods' directions,
+    /// a parabola of the time, lies within its Bezier coefficients.
+    fn stays_open(&self, chain: &Chain<D>, k: usize) -> bool {
+        let rods =
+            |points: &[Point<D>]| [sub(points[k], points[k - 1]), sub(points[k + 1], points[k])];
+        let [into_was, out_was] = rods(&self.points);
+        let [into, out] = rods(chain.points());
+        let least = dot(into_was, out_was).min(dot(into, out));
+        least.min(dot(into_was, out) + dot(into, out_was)) >= 0.0
+    }
+
+    /// Returns whether some rods and their connectors are at least `needed_m` from all parts that are not near them along
+    /// the chain.
+    fn are_rods_apart(&mut self, chain: &Chain<D>, rods: Range<usize>, needed_m: f64) -> bool {
+        for rod in rods {
+            if self.rods.until_m[rod] - self.odometer_m >= needed_m + SLACK_M {
+                continue;
+            }
+            let gap_m = self.measure_rod_gap_m(chain, rod, needed_m);
+            self.rods.until_m[rod] = self.odometer_m + gap_m;
+            if gap_m < needed_m {
+                return false;
+            }
         }
+        true
+    }
+
+    /// Returns the gap between a rod with its connectors and all parts that can be in their way, up to the distance
+    /// searched, meters.
+    fn measure_rod_gap_m(&mut self, chain: &Chain<D>, rod: usize, needed_m: f64) -> f64 {
+        let thickness_m = 2.0 * chain.max_radius_m();
+        let search_m = needed_m + SEARCH_LENGTHS * chain.max_rod_m();
         let points = chain.points();
-        let ends = [points[rod], points[rod + 1]];
-        let mut clearance_m = search_m.min(rod_connector_distance_m(points, rod));
-        let near = Aabb::from_points(&ends).grown(search_m + self.odometer_m - self.built_at_m);
-        self.tree.visit(&near, |other| {
-            let other_ends = [points[other], points[other + 1]];
-            if other.abs_diff(rod) > NEIGHBORS
-                && !are_rods_surely_apart(ends, other_ends, clearance_m)
-            {
-                clearance_m = clearance_m.min(between_segments(ends, other_ends).distance_m);
+        let ends = |rod: usize| [points[rod], points[rod + 1]];
+        let near = Aabb::from_points(&ends(rod));
+        let bounds = points.windows(2).map(Aabb::from_points);
+        let rods = chain.rods().len();
+        let mut gap_m = search_m;
+        self.rods.visit_near(&near, search_m + thickness_m, self.odometer_m, bounds, |other| {
+            if other == rod || are_rods_surely_apart(ends(rod), ends(other), gap_m + thickness_m) {
+                return;
+            }
+            for [one, other] in part_pairs(rod.min(other), rod.max(other), rods) {
+                if !one.is_near_along_chain(other) {
+                    let pair_m = chain.own_gap_m(points, [one, other]);
+                    gap_m = gap_m.min(pair_m.unwrap_or(f64::INFINITY));
+                }
             }
         });
-        clearance_m
+        gap_m
     }
+
+    /// Returns whether a block is at least `needed_m` from all blocks that are not beside it along the chain, by their
+    /// boxes.
+    fn is_block_apart(&mut self, chain: &Chain<D>, block: usize, needed_m: f64) -> bool {
+        if self.blocks.until_m[block] - self.odometer_m < needed_m + SLACK_M {
+            let gap_m = self.measure_block_gap_m(chain, block, needed_m);
+            self.blocks.until_m[block] = self.odometer_m + gap_m;
+            return gap_m >= needed_m;
+        }
+        true
+    }
+
+    fn measure_block_gap_m(&mut self, chain: &Chain<D>, block: usize, needed_m: f64) -> f64 {
+        let thickness_m = 2.0 * chain.max_radius_m();
+        let search_m = needed_m + SEARCH_LENGTHS * BLOCK as f64 * chain.max_rod_m();
+        let rods = chain.rods().len();
+        let bounds_of = |block: usize| {
+            let rods = block_rods(block, rods);
+            Aabb::from_points(&chain.points()[rods.start..rods.end + 1])
+        };
+        let own = bounds_of(block);
+        let bounds = (0..rods.div_ceil(BLOCK)).map(bounds_of);
+        let mut gap_m = search_m;
+        self.blocks.visit_near(&own, search_m + thickness_m, self.odometer_m, bounds, |other| {
+            if other.abs_diff(block) > 1 {
+                gap_m = gap_m.min(own.distance_m(&bounds_of(other)) - thickness_m);
+            }
+        });
+        gap_m
+    }
+}
+
+fn block_rods(block: usize, rods: usize) -> Range<usize> {
+    BLOCK * block..(BLOCK * (block + 1)).min(rods)
+}
+
+/// Returns stretches of rods, of which each shares a block with the next.
+fn stretches(rods: usize) -> impl Iterator<Item = Range<usize>> {
+    let last = rods.saturating_sub(BLOCK).div_ceil(STRIDE).max(1);
+    (0..last).map(move |k| STRIDE * k..(STRIDE * k + STRETCH).min(rods))
 }
 
 /// Returns whether two rods are surely as far from each other as `clearance_m`, less half of the margin:
@@ -144,18 +323,5 @@ fn are_rods_surely_apart<const D: usize>(
     clearance_m: f64,
 ) -> bool {
     let middles_m = 0.5 * distance(add(a, b), add(c, d));
-    middles_m - 0.5 * (distance(a, b) + distance(c, d)) >= clearance_m - 0.5 * MARGIN_M
-}
-
-/// Returns the distance of a rod from the connectors nearest to it that may not touch it: those
-/// beyond its neighbors' far ends.
-fn rod_connector_distance_m<const D: usize>(points: &[Point<D>], rod: usize) -> f64 {
-    let before = rod.checked_sub(NEIGHBORS).and_then(|k| points.get(k));
-    let after = points.get(rod + NEIGHBORS + 1);
-    let mut least_m = f64::INFINITY;
-    for p in [before, after].into_iter().flatten() {
-        let nearest = nearest_on_segment(*p, points[rod], points[rod + 1]);
-        least_m = least_m.min(distance(*p, nearest));
-    }
-    least_m
+    middles_m - 0.5 * (distance(a, b) + distance(c, d)) >= clearance_m + 0.5 * MARGIN_M
 }

@@ -6,10 +6,11 @@
 use super::chain::{Chain, LENGTH_TOLERANCE_M, Rod};
 use super::geometry::{Aabb, ConvexCore, Point, angle_between_rad, distance, sub};
 use super::obstacle::{Obstacles, swept_bounds};
+use super::own_body::ChainPart;
 use super::reaction::Reaction;
 use super::rod_bvh::RodBvh;
 use super::rules::ReactionRules;
-use super::sweep::RodSweep;
+use super::sweep::{RodPairSweep, RodSweep};
 use super::veto::VetoReason;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -25,6 +26,9 @@ pub const BEND_TOLERANCE_RAD: f64 = 1e-9;
 /// Distance below which a body without thickness is touched, meters. Its radius less the tolerance would
 /// be negative, and it could be passed.
 const TOUCH_M: f64 = 1e-12;
+
+/// Rounding of the depth of two parts that move alike, meters.
+const DEPTH_ROUNDING_M: f64 = 1e-12;
 
 /// New positions before they are accepted, for a run of connectors around the initiator.
 #[derive(Debug, Clone, Default)]
@@ -64,15 +68,37 @@ impl<const D: usize> TentativePositions<D> {
     }
 }
 
-/// A part that may be in the way.
+/// A part that may be in the way of a rod, or of the connector at its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct BlockingPart<const D: usize> {
     pub(super) core: ConvexCore<D>,
-    pub(super) radius_m: f64,
     pub(super) name: BlockingPartOwner,
-    /// Whether it is in the way of the rod, and of the connector at its end.
-    pub(super) stops_rod: bool,
-    pub(super) stops_tip: bool,
+    /// Least distance of the rod's core line from the core, meters; none if it is not in the way of the rod.
+    pub(super) rod_separation_m: Option<f64>,
+    /// The same of the middle of the connector at the rod's end.
+    pub(super) tip_separation_m: Option<f64>,
+    /// The ends of its core line before the motion; none of an obstacle, which stands still in it.
+    pub(super) before: Option<[Point<D>; 2]>,
+}
+
+impl<const D: usize> BlockingPart<D> {
+    /// Returns the greatest distance that anything keeps from it, meters.
+    pub(super) fn max_separation_m(&self) -> f64 {
+        self.rod_separation_m.unwrap_or(0.0).max(self.tip_separation_m.unwrap_or(0.0))
+    }
+
+    fn core_before(&self) -> ConvexCore<D> {
+        self.before.map_or(self.core, ConvexCore::Segment)
+    }
+}
+
+/// What moves: a connector, and the rod to its master, unless it leads.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MovingPart {
+    pub(super) tip: usize,
+    pub(super) tip_radius_m: f64,
+    /// Index and radius of the rod.
+    pub(super) rod: Option<(usize, f64)>,
 }
 
 /// The owner of a block. Its order breaks ties, because the order in which blocks are visited depends on
@@ -136,6 +162,16 @@ pub(super) struct SlaveStep<const D: usize> {
 }
 
 impl<const D: usize> SlaveStep<D> {
+    /// Returns the slave and its rod as what moves.
+    pub(super) fn moving_part(&self) -> MovingPart {
+        let rod = self.master.min(self.slave);
+        MovingPart {
+            tip: self.slave,
+            tip_radius_m: self.tip_radius_m,
+            rod: Some((rod, self.rod.radius_m)),
+        }
+    }
+
     fn rod_sweep(&self, s: Point<D>) -> RodSweep<D> {
         RodSweep { from: [self.mo, self.so], to: [self.mn, s] }
     }
@@ -173,68 +209,78 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         self.tentative.get(i).unwrap_or(self.chain.points()[i])
     }
 
-    /// Visits every block that may be in the way of a rod and the connector at its end. If `rod` is
-    /// `None`, the connector `tip` is alone.
+    /// Visits every block that may be in the way of a moving part.
     pub(super) fn visit_blocking_parts(
         &self,
         near: &Aabb<D>,
-        rod: Option<usize>,
-        tip: usize,
+        moving: &MovingPart,
         mut visit_one: impl FnMut(&BlockingPart<D>),
     ) {
         self.obstacles.visit(near, |o| {
             visit_one(&BlockingPart {
                 core: o.core,
-                radius_m: o.radius_m,
                 name: BlockingPartOwner::Obstacle(o.id),
-                stops_rod: true,
-                stops_tip: true,
+                rod_separation_m: moving.rod.map(|(_, radius_m)| o.radius_m + radius_m),
+                tip_separation_m: Some(o.radius_m + moving.tip_radius_m),
+                before: None,
             });
         });
         if self.rules.self_collision {
             self.own_rods.visit(near, |other| {
-                for block in self.own_blocking_parts(other, rod, tip).into_iter().flatten() {
+                for block in self.own_blocking_parts(other, moving).into_iter().flatten() {
                     visit_one(&block);
                 }
             });
         }
     }
 
-    /// Returns a rod of the chain and its connectors (the last rod's both) as obstacles to another.
-    /// Neighbors are exempt because they touch by construction, or nearly so in a tight bend.
+    /// Returns a rod of the chain and its connectors (the last rod's both) as obstacles to a moving part.
     fn own_blocking_parts(
         &self,
         other: usize,
-        rod: Option<usize>,
-        tip: usize,
+        moving: &MovingPart,
     ) -> [Option<BlockingPart<D>>; 3] {
-        let own_rod = BlockingPart {
-            core: ConvexCore::Segment([self.position(other), self.position(other + 1)]),
-            radius_m: self.chain.rods()[other].radius_m,
-            name: BlockingPartOwner::OwnRod(other),
-            stops_rod: rod.is_some_and(|r| other.abs_diff(r) > 2),
-            stops_tip: tip + 1 < other || tip > other + 2,
-        };
         // Each rod stands for the connector at its lower end, so that none is visited twice.
         let is_last = other + 2 == self.chain.connectors().len();
-        let lower = self.own_connector_blocking_part(other, rod, tip);
-        let upper = is_last.then(|| self.own_connector_blocking_part(other + 1, rod, tip));
-        [Some(own_rod), Some(lower), upper].map(|b| b.filter(|b| b.stops_rod || b.stops_tip))
+        let upper = is_last.then_some(ChainPart::Connector(other + 1));
+        let parts = [Some(ChainPart::Rod(other)), Some(ChainPart::Connector(other)), upper];
+        parts.map(|part| part.and_then(|part| self.own_blocking_part(part, moving)))
     }
 
+    /// Returns a part of the chain as an obstacle to a moving one; none if it is in the way of neither its rod nor its
+    /// connector.
     #[inline]
-    fn own_connector_blocking_part(
-        &self,
-        c: usize,
-        rod: Option<usize>,
-        tip: usize,
-    ) -> BlockingPart<D> {
-        BlockingPart {
-            core: ConvexCore::Point(self.position(c)),
-            radius_m: self.chain.connectors()[c].radius_m,
-            name: BlockingPartOwner::OwnConnector(c),
-            stops_rod: rod.is_some_and(|r| c + 1 < r || c > r + 2),
-            stops_tip: c.abs_diff(tip) > 1,
+    fn own_blocking_part(&self, part: ChainPart, moving: &MovingPart) -> Option<BlockingPart<D>> {
+        let separation_m = |moves: ChainPart| {
+            let is_settled = !part.is_near_along_chain(moves) || self.is_settled(part, moving);
+            if is_settled { self.chain.min_separation_m(moves, part) } else { None }
+        };
+        let rod_separation_m = moving.rod.and_then(|(rod, _)| separation_m(ChainPart::Rod(rod)));
+        let tip_separation_m = separation_m(ChainPart::Connector(moving.tip));
+        if rod_separation_m.is_none() && tip_separation_m.is_none() {
+            return None;
+        }
+        let ends = [part.connector(), part.last_connector()].map(|k| self.position(k));
+        let before = Some(part.ends(self.chain.points()));
+        let (core, name) = match part {
+            ChainPart::Connector(k) => {
+                (ConvexCore::Point(ends[0]), BlockingPartOwner::OwnConnector(k))
+            }
+            ChainPart::Rod(i) => (ConvexCore::Segment(ends), BlockingPartOwner::OwnRod(i)),
+        };
+        Some(BlockingPart { core, name, rod_separation_m, tip_separation_m, before })
+    }
+
+    /// Returns whether a part near along the chain has its place for this motion. One that has yet to follow would object
+    /// where it is now, though it is about to be pushed on; when its turn comes it is checked against what has moved.
+    fn is_settled(&self, part: ChainPart, moving: &MovingPart) -> bool {
+        let Some((rod, _)) = moving.rod else { return false };
+        let goes_up = moving.tip > rod;
+        if goes_up {
+            // The connectors below the initiator follow in the second sweep, after those above it.
+            self.tentative.from <= part.connector() && part.last_connector() <= moving.tip
+        } else {
+            part.connector() >= moving.tip
         }
     }
 
@@ -254,9 +300,8 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         let reach_m = step.rod.radius_m.max(step.tip_radius_m);
         let near = swept_bounds([step.mo, step.so, step.mn, s], reach_m);
         let mut worst: Option<(f64, BlockingPartOwner, VetoReason)> = None;
-        let rod = step.master.min(step.slave);
         let travel_m = step.rod_sweep(s).max_travel_m();
-        self.visit_blocking_parts(&near, Some(rod), step.slave, |block| {
+        self.visit_blocking_parts(&near, &step.moving_part(), |block| {
             if let Some((depth_m, reason)) = depth_and_reason(step, s, travel_m, block) {
                 // Of equal depths the lower name counts, because blocks come in no particular order.
                 let is_deeper = worst
@@ -291,48 +336,94 @@ fn depth_and_reason<const D: usize>(
 ) -> Option<(f64, VetoReason)> {
     let rod = [step.mn, s];
     let core = &block.core;
-    let rod_m = block.radius_m + step.rod.radius_m;
-    let tip_m = block.radius_m + step.tip_radius_m;
-    let tip_is_clear = !block.stops_tip || core.is_clear_of_point(s, contact_distance_m(tip_m));
+    let is_tip_clear = block
+        .tip_separation_m
+        .is_none_or(|tip_m| core.is_clear_of_point(s, contact_distance_m(tip_m)));
     // One distance clears both the end of the path and the path itself: the usual case.
-    let sure_m = contact_distance_m(rod_m).max(RodSweep::<D>::safe_distance_m(travel_m, rod_m));
-    if tip_is_clear && (!block.stops_rod || core.is_clear_of_segment(rod, sure_m)) {
+    let approach_m = travel_m + block_travel_m(block);
+    let is_surely_clear = |separation_m: f64| {
+        let path_m = RodSweep::<D>::safe_distance_m(approach_m, separation_m);
+        core.is_clear_of_segment(rod, contact_distance_m(separation_m).max(path_m))
+    };
+    let separation_m = block.rod_separation_m.or(block.tip_separation_m);
+    if is_tip_clear && separation_m.is_none_or(is_surely_clear) {
         return None;
     }
-    let rod_is_clear = !block.stops_rod || core.is_clear_of_segment(rod, contact_distance_m(rod_m));
-    if rod_is_clear && tip_is_clear {
-        // A rod that starts inside has no clear path, and must be able to get out.
-        let is_allowed =
-            step.rod_sweep(s).is_path_clear(core, rod_m, travel_m) || was_inside(step, block);
-        return (!is_allowed).then_some((0.0, VetoReason::WouldTunnel));
+    let is_rod_clear = block
+        .rod_separation_m
+        .is_none_or(|rod_m| core.is_clear_of_segment(rod, contact_distance_m(rod_m)));
+    if is_rod_clear && is_tip_clear {
+        let is_path_clear = is_path_clear(step, s, travel_m, block);
+        return (!is_path_clear).then_some((0.0, VetoReason::WouldTunnel));
     }
-    let now_m = depth_m(step.mn, s, step, block);
-    let before_m = depth_m(step.mo, step.so, step, block);
-    // A part that starts inside may stay, but must not go deeper.
-    if before_m > TOLERANCE_M && now_m <= before_m {
+    let now_m = depth_m([step.mn, s], core, block);
+    let before_m = depth_m([step.mo, step.so], &block.core_before(), block);
+    let was_inside = before_m > TOLERANCE_M;
+    // A part that starts inside may stay, but must not go deeper, nor through another part of its chain.
+    let is_no_deeper = match block.before {
+        None => now_m <= before_m,
+        Some(_) => now_m <= before_m + DEPTH_ROUNDING_M && is_path_clear(step, s, travel_m, block),
+    };
+    if was_inside && is_no_deeper {
         return None;
     }
-    let reason =
-        if before_m > TOLERANCE_M { VetoReason::Inside } else { VetoReason::BothSidesBlocked };
+    let reason = if was_inside { VetoReason::Inside } else { VetoReason::BothSidesBlocked };
     Some((now_m, reason))
 }
 
-fn was_inside<const D: usize>(step: &SlaveStep<D>, block: &BlockingPart<D>) -> bool {
-    depth_m(step.mo, step.so, step, block) > TOLERANCE_M
+/// Returns the longest distance that a point of a block moves in the motion, meters.
+fn block_travel_m<const D: usize>(block: &BlockingPart<D>) -> f64 {
+    let Some(from) = block.before else { return 0.0 };
+    RodSweep { from, to: core_ends(&block.core) }.max_travel_m()
 }
 
-/// Returns the depth of a rod, or of the connector at its end, in a block, meters; negative outside.
-fn depth_m<const D: usize>(
-    m: Point<D>,
-    s: Point<D>,
+/// Returns the ends of the core line of a part of a chain.
+fn core_ends<const D: usize>(core: &ConvexCore<D>) -> [Point<D>; 2] {
+    match core {
+        ConvexCore::Point(at) => [*at; 2],
+        ConvexCore::Segment(ends) => *ends,
+        ConvexCore::Cuboid(cuboid) => [cuboid.center; 2],
+    }
+}
+
+/// Returns whether the rod to a slave, or the slave alone, passes through no block on its way.
+fn is_path_clear<const D: usize>(
     step: &SlaveStep<D>,
+    s: Point<D>,
+    travel_m: f64,
+    block: &BlockingPart<D>,
+) -> bool {
+    let sweep = step.rod_sweep(s);
+    // A part of the chain moves as well, and may start too near.
+    if let Some(from) = block.before {
+        let other = RodSweep { from, to: core_ends(&block.core) };
+        return match (block.rod_separation_m, block.tip_separation_m) {
+            (Some(rod_m), _) => RodPairSweep { one: sweep, other }.is_clear(rod_m),
+            (None, Some(tip_m)) => {
+                let tip = RodSweep { from: [step.so; 2], to: [s; 2] };
+                RodPairSweep { one: tip, other }.is_clear(tip_m)
+            }
+            (None, None) => true,
+        };
+    }
+    let Some(rod_m) = block.rod_separation_m else { return true };
+    // A rod that starts inside has no clear path, and must be able to get out.
+    sweep.is_path_clear(&block.core, rod_m, travel_m)
+        || depth_m([step.mo, step.so], &block.core, block) > TOLERANCE_M
+}
+
+/// Returns the depth of a rod, or of the connector at its second end, in the core of a block, meters; negative outside.
+fn depth_m<const D: usize>(
+    rod: [Point<D>; 2],
+    core: &ConvexCore<D>,
     block: &BlockingPart<D>,
 ) -> f64 {
-    let rod_m =
-        block.radius_m + step.rod.radius_m - block.core.nearest_to_segment([m, s]).distance_m;
-    let tip_m = block.radius_m + step.tip_radius_m - block.core.nearest_to_point(s).distance_m;
-    let rod_m = if block.stops_rod { rod_m } else { f64::NEG_INFINITY };
-    let tip_m = if block.stops_tip { tip_m } else { f64::NEG_INFINITY };
+    let rod_m = block
+        .rod_separation_m
+        .map_or(f64::NEG_INFINITY, |rod_m| rod_m - core.nearest_to_segment(rod).distance_m);
+    let tip_m = block
+        .tip_separation_m
+        .map_or(f64::NEG_INFINITY, |tip_m| tip_m - core.nearest_to_point(rod[1]).distance_m);
     rod_m.max(tip_m)
 }
 

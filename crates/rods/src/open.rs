@@ -3,9 +3,7 @@
 //!
 //! A sweep is a series of dependent square roots and divisions, and its speed is their latency. The
 //! two sweeps of an initiator in the middle depend only on the initiator, so they take turns in one
-//! loop and the processor overlaps them; every bit is the same as one after the other. Several
-//! motions of the same connector overlap likewise: each follows the one before it, two connectors
-//! behind.
+//! loop and the processor overlaps them; every bit is the same as one after the other.
 
 use super::candidates::guide_line_slave_position;
 use super::chain::{Chain, Rod};
@@ -60,73 +58,6 @@ fn sweep<const D: usize, const NEARLY: bool>(
     tally.record_touched_range(down.master..up.master + 1);
     tally.changed += 1 + up.changed + down.changed;
     tally.record_slave_move(up.longest2.max(down.longest2).sqrt());
-}
-
-/// Largest number of motions in one batch; a request of more sub-steps is made one by one. One motion after the other
-/// takes 19 ns a connector, eight at once about 4 ns.
-pub(super) const MAX_BATCH: usize = 8;
-/// Connectors by which a motion is behind the one before it: it reads its slave and the connector
-/// beyond, and both must be final.
-const LANE_OFFSET: usize = 2;
-
-/// Moves connector `k` through at most [`MAX_BATCH`] places, and all connectors that must follow; slaves stay
-/// as by [`StayRule::Nearly`]. Returns a bound on the travel of any connector, meters.
-pub(super) fn pull_through_targets<const D: usize>(
-    chain: &mut Chain<D>,
-    k: usize,
-    to: &[Point<D>],
-    tally: &mut MotionEffects,
-) -> f64 {
-    let min_move_m = chain.min_move_m();
-    let (points, rods) = chain.parts_mut();
-    let at = points[k];
-    let mut sweeps = ChainDirection::BOTH.map(|direction| {
-        std::array::from_fn::<_, MAX_BATCH, _>(|j| {
-            // Sweeps beyond the last motion fill the array and are never advanced.
-            let j = j.min(to.len() - 1);
-            ObstacleFreePropagation::start(direction, k, motion_start_point(at, to, j), to[j])
-        })
-    });
-    for sweeps in &mut sweeps {
-        run_staggered_sweeps(&mut sweeps[..to.len()], points, rods, min_move_m);
-    }
-    let [up, down] = sweeps;
-    let mut travel_m = 0.0;
-    for (j, (up, down)) in up.iter().zip(&down).take(to.len()).enumerate() {
-        let slave_m = up.longest2.max(down.longest2).sqrt();
-        travel_m += slave_m.max(distance(motion_start_point(at, to, j), to[j]));
-        tally.record_touched_range(down.master..up.master + 1);
-        tally.changed += 1 + up.changed + down.changed;
-        tally.record_slave_move(slave_m);
-    }
-    points[k] = to[to.len() - 1];
-    travel_m
-}
-
-/// Returns where the initiator is before motion `j`: at `at` before the first, then at the target of the one before.
-#[inline]
-fn motion_start_point<const D: usize>(at: Point<D>, to: &[Point<D>], j: usize) -> Point<D> {
-    if j == 0 { at } else { to[j - 1] }
-}
-
-fn run_staggered_sweeps<const D: usize>(
-    sweeps: &mut [ObstacleFreePropagation<D>],
-    points: &mut [Point<D>],
-    rods: &[Rod],
-    min_move_m: f64,
-) {
-    let mut round = 0;
-    let mut is_moving = true;
-    // A sweep that has yet to start does not move, so rounds continue at least until the last one has started.
-    while is_moving || round <= LANE_OFFSET * sweeps.len() {
-        is_moving = false;
-        for (j, sweep) in sweeps.iter_mut().enumerate() {
-            if round >= LANE_OFFSET * j {
-                is_moving |= sweep.advance::<true>(points, rods, min_move_m);
-            }
-        }
-        round += 1;
-    }
 }
 
 /// One sweep, outward from the initiator.

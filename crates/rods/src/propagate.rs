@@ -6,11 +6,11 @@
 
 use super::candidates::{CandidatePosition, CandidateScratch};
 use super::chain::{Chain, is_in_range, out_of_range};
-use super::geometry::{Aabb, Point, distance, lerp};
+use super::geometry::{Point, distance, lerp};
 use super::motion_bounds::SeparationBounds;
 use super::motion_context::{
-    BlockingPartOwner, IncompleteVeto, MotionContext, SlaveStep, TOLERANCE_M, TentativePositions,
-    contact_distance_m, is_length_allowed,
+    BlockingPartOwner, IncompleteVeto, MotionContext, MovingPart, SlaveStep, TOLERANCE_M,
+    TentativePositions, contact_distance_m, is_length_allowed,
 };
 use super::obstacle::{Obstacles, swept_bounds};
 use super::open::{self, StayRule};
@@ -29,6 +29,9 @@ use std::sync::Arc;
 /// Largest number of sub-steps of a request. One that would need more is an input error: it comes from a wrong
 /// unit or from a rod of nearly no length, and would seem to hang.
 const MAX_SUB_STEPS: f64 = 1e6;
+/// Fraction of a sub-step by which a request may be longer than a whole number of them: the length of a request is that
+/// of a difference of coordinates, and its rounding must not cost a sub-step.
+const SUB_STEP_ROUNDING: f64 = 1e-9;
 /// Number of sub-steps between two checks for an interrupt. On a chain of a million connectors 16 sub-steps take about
 /// 0.3 s, and on a short one the check costs nothing beside them.
 const INTERRUPT_CHECK_INTERVAL: usize = 16;
@@ -44,10 +47,8 @@ pub struct Propagator<const D: usize> {
     tentative: TentativePositions<D>,
     own_rods: RodBvh<D>,
     motion_bounds: SeparationBounds<D>,
-    /// When to try proofs of single sub-steps.
+    /// When to try proofs of sub-steps among obstacles.
     proofs: SeparationProofSchedule,
-    /// When to try proofs of all sub-steps of a request at once.
-    request_proofs: SeparationProofSchedule,
     scratch: CandidateScratch<D>,
     alternatives: Vec<BacktrackAlternative<D>>,
     /// Positions before the request, of the run of connectors that have moved since: a veto in a
@@ -150,7 +151,8 @@ impl<const D: usize> Propagator<D> {
             return Ok(MotionOutcome::Vetoed(make_veto(chain, driven.first, by, objection)));
         }
         let n = self.sub_steps(chain, obstacles, &driven, from)?;
-        if self.reaction.is_none() && self.try_substep_batch(chain, obstacles, &driven, n) {
+        let may_be_whole = n > 1 && self.reaction.is_none() && self.rules.step_m.is_none();
+        if may_be_whole && self.try_whole_motion(chain, obstacles, &driven) {
             return Ok(MotionOutcome::Moved(self.completed_motion(None)));
         }
         for k in 1..=n {
@@ -235,7 +237,8 @@ impl<const D: usize> Propagator<D> {
             }
             let points = chain.points();
             let rods = 0..chain.rods().len();
-            self.own_rods.refit(rods.map(|i| rod_box(chain, i, [points[i], points[i + 1]])));
+            let ends = |i: usize| [points[i], points[i + 1]];
+            self.own_rods.refit(rods.map(|i| chain.rod_bounds(i, ends(i), 0.0)));
         }
         let rotated = self.tally.rotated;
         let followed = self.propagate_from_driven(chain, obstacles, &driven);
@@ -260,7 +263,8 @@ impl<const D: usize> Propagator<D> {
         let up = PropagationContext { chain, obstacles, direction: ChainDirection::Up };
         let down = PropagationContext { direction: ChainDirection::Down, ..up };
         self.sweep(up, driven.first + driven.n - 1)?;
-        self.sweep(down, driven.first)
+        self.sweep(down, driven.first)?;
+        self.check_own_paths(chain)
     }
 
     fn place_driven_connectors(
@@ -443,7 +447,9 @@ impl<const D: usize> Propagator<D> {
         let step = self.context(sweep.chain, sweep.obstacles).slave_step(next, sweep.direction);
         // The bend counts as well: its inner rod has turned, though its outer one stays. Without this
         // test a chain with a limit of 60 degrees stopped at 86.
-        is_length_allowed(step.rod, distance(step.so, step.mn)) && step.is_bend_allowed_at(step.so)
+        is_length_allowed(step.rod, distance(step.so, step.mn))
+            && step.is_bend_allowed_at(step.so)
+            && self.context(sweep.chain, sweep.obstacles).may_end_at(sweep, slave)
     }
 
     fn place(&mut self, chain: &Chain<D>, i: usize, at: Point<D>) {
@@ -458,7 +464,7 @@ impl<const D: usize> Propagator<D> {
         }
         for rod in i.saturating_sub(1)..(i + 1).min(chain.rods().len()) {
             let ends = [rod, rod + 1].map(|k| self.tentative.get(k).unwrap_or(chain.points()[k]));
-            self.own_rods.set(rod, rod_box(chain, rod, ends));
+            self.own_rods.set(rod, chain.rod_bounds(rod, ends, 0.0));
         }
     }
 
@@ -532,7 +538,7 @@ fn count_sub_steps(
         _ if is_empty && !rules.self_collision => f64::INFINITY,
         _ => default_step_m,
     };
-    let n = (travel_m / step_m).ceil().max(1.0);
+    let n = (travel_m / step_m - SUB_STEP_ROUNDING).ceil().max(1.0);
     if n > MAX_SUB_STEPS {
         return Err(InputError::new(
             "target",
@@ -593,11 +599,10 @@ impl<const D: usize> MotionContext<'_, D> {
         let radius_m = self.chain.connectors()[k].radius_m;
         let near = swept_bounds([from, from, to, to], radius_m);
         let mut worst: Option<(f64, BlockingPartOwner, VetoReason)> = None;
-        self.visit_blocking_parts(&near, None, k, |block| {
-            let keep_m = block.radius_m + radius_m;
-            if !block.stops_tip
-                || block.core.is_clear_of_segment([from, to], contact_distance_m(keep_m))
-            {
+        let moving = MovingPart { tip: k, tip_radius_m: radius_m, rod: None };
+        self.visit_blocking_parts(&near, &moving, |block| {
+            let Some(keep_m) = block.tip_separation_m else { return };
+            if block.core.is_clear_of_segment([from, to], contact_distance_m(keep_m)) {
                 return;
             }
             let before_m = keep_m - block.core.nearest_to_point(from).distance_m;
@@ -647,14 +652,6 @@ fn project<const D: usize>(
     Ok(())
 }
 
-/// Returns the box around a rod and the connectors at its ends, which are at `ends`.
-#[inline]
-fn rod_box<const D: usize>(chain: &Chain<D>, i: usize, ends: [Point<D>; 2]) -> Aabb<D> {
-    // Rods are no thicker than their connectors.
-    let radius_m = chain.connectors()[i].radius_m.max(chain.connectors()[i + 1].radius_m);
-    Aabb::from_points(&ends).grown(radius_m)
-}
-
 /// Returns the veto of an objection, with the chain where its motion has ended.
 fn make_veto<const D: usize>(
     chain: &Chain<D>,
@@ -686,6 +683,7 @@ fn check<const D: usize>(
 }
 
 pub mod local_solver;
+mod own_body;
 mod separation;
 #[cfg(test)]
 mod tests;

@@ -136,11 +136,11 @@ impl<const D: usize> DirectionSearch<'_, D> {
         let s = add_scaled(self.step.mn, u, self.length_m);
         let mut worst: Option<WorstBlock<D>> = None;
         for block in self.blocks {
-            let rod_m = block.radius_m + self.step.rod.radius_m;
-            if block.stops_rod
-                && !block.core.is_clear_of_segment([self.step.mn, s], contact_distance_m(rod_m))
+            let rod = [self.step.mn, s];
+            if let Some(rod_m) = block.rod_separation_m
+                && !block.core.is_clear_of_segment(rod, contact_distance_m(rod_m))
             {
-                let nearest = block.core.nearest_to_segment([self.step.mn, s]);
+                let nearest = block.core.nearest_to_segment(rod);
                 let hit = WorstBlock {
                     depth_m: contact_distance_m(rod_m) - nearest.distance_m,
                     point: nearest.on_core,
@@ -150,8 +150,9 @@ impl<const D: usize> DirectionSearch<'_, D> {
                 };
                 hit.replace_if_worse(&mut worst);
             }
-            let tip_m = block.radius_m + self.step.tip_radius_m;
-            if block.stops_tip && !block.core.is_clear_of_point(s, contact_distance_m(tip_m)) {
+            if let Some(tip_m) = block.tip_separation_m
+                && !block.core.is_clear_of_point(s, contact_distance_m(tip_m))
+            {
                 let nearest = block.core.nearest_to_point(s);
                 let hit = WorstBlock {
                     depth_m: contact_distance_m(tip_m) - nearest.distance_m,

@@ -7,7 +7,10 @@
 //! than half of the distance that it must keep at rest. [`find_tunneling`](super::find_tunneling) describes the guarantees of
 //! that and their limits.
 
-use super::geometry::{ConvexCore, Point, add_scaled, cross_2d, dot, lerp, segments_cross, sub};
+use super::geometry::{
+    ConvexCore, Point, add, add_scaled, between_segments, cross_2d, dot, lerp, norm, scaled,
+    segments_cross, sub,
+};
 
 /// A moving rod: master and slave, before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,6 +115,64 @@ impl<const D: usize> RodSweep<D> {
 
 /// Distance below which bodies touch, meters.
 const TOUCH_M: f64 = 1e-12;
+
+/// Two parts of a chain that move at once; a connector is a rod without length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RodPairSweep<const D: usize> {
+    pub(super) one: RodSweep<D>,
+    pub(super) other: RodSweep<D>,
+}
+
+impl<const D: usize> RodPairSweep<D> {
+    /// Returns whether the parts never come nearer to each other on their way than half of the distance that they keep
+    /// at rest, or half of that from which they start. So they never pass through each other, and parts that start
+    /// too near can get apart; only where their core lines cross at the start, every way is allowed.
+    pub(super) fn is_clear(&self, separation_m: f64) -> bool {
+        let travel_m = self.max_approach_m();
+        let start_m = self.distance_m(0.0);
+        if start_m < TOUCH_M {
+            return true;
+        }
+        let kept_m = KEPT_FRACTION * separation_m.min(start_m);
+        let end_m = self.distance_m(1.0);
+        // The two come nearer by their travel at most, from the start on and backward from the end.
+        if start_m + end_m - travel_m >= 2.0 * (kept_m + TOUCH_M) {
+            return true;
+        }
+        let mut time = 0.0;
+        let mut clearance_m = start_m - kept_m;
+        for _ in 0..MAX_ADVANCES {
+            time += clearance_m.max(TOUCH_M) / travel_m;
+            if time >= 1.0 {
+                return end_m >= kept_m;
+            }
+            clearance_m = self.distance_m(time) - kept_m;
+            if clearance_m <= 0.0 {
+                return false;
+            }
+        }
+        false
+    }
+
+    fn distance_m(&self, time: f64) -> f64 {
+        let [one, other] = [&self.one, &self.other]
+            .map(|sweep| [0, 1].map(|end| lerp(sweep.from[end], sweep.to[end], time)));
+        between_segments(one, other).distance_m
+    }
+
+    /// Returns a bound on the distance by which the parts approach each other, meters. What both move alike does not
+    /// count: most of the motion of neighbors along a chain.
+    fn max_approach_m(&self) -> f64 {
+        let moves = [&self.one, &self.other]
+            .map(|sweep| [0, 1].map(|end| sub(sweep.to[end], sweep.from[end])));
+        let sum = add(add(moves[0][0], moves[0][1]), add(moves[1][0], moves[1][1]));
+        let mean = scaled(sum, 0.25);
+        let longest_m = |ends: [Point<D>; 2]| {
+            ends.map(|by| norm(sub(by, mean))).into_iter().fold(0.0, f64::max)
+        };
+        longest_m(moves[0]) + longest_m(moves[1])
+    }
+}
 
 /// Returns the real roots of `a x^2 + b x + c`; none if it is zero everywhere.
 #[inline]

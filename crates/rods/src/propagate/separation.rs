@@ -1,13 +1,13 @@
 //! Motions with self-collision in which no part of the chain comes near another.
 //!
 //! Most motions are like that. They are made without a test of each pair of parts, and
-//! [`SeparationBounds`] proves afterwards that no test could have objected; where the proof fails, the
+//! [`SeparationBounds`](crate::motion_bounds::SeparationBounds) proves afterwards that no test could have objected; where the proof fails, the
 //! motion is taken back and made with all tests. The result is the same bits either way.
 
 use super::{InitiatingConnectors, MotionEffects, Propagator, can_only_self_collide};
 use crate::chain::Chain;
 use crate::geometry::distance;
-use crate::motion_bounds::SeparationBounds;
+use crate::motion_bounds::ProvenMotion;
 use crate::obstacle::Obstacles;
 use crate::open::{self, StayRule};
 use std::ops::Range;
@@ -57,67 +57,50 @@ impl<const D: usize> Propagator<D> {
         driven: &InitiatingConnectors<D>,
         is_last: bool,
     ) -> bool {
-        if !SeparationBounds::has_enough_rods(chain) {
+        let Some(tally) = self.pull_and_prove(chain, driven, StayRule::Nearly) else {
             return false;
+        };
+        // A later sub-step may end in a veto, which takes back the whole request.
+        if !is_last {
+            self.save_positions(driven.first, tally.from..tally.to);
         }
-        self.motion_bounds.record(chain);
-        let mut tally = MotionEffects::start(driven.first);
-        let head_m = distance(chain.points()[driven.first], driven.to[0]);
-        open::pull_chain_by_connector(
-            chain,
-            driven.first,
-            driven.to[0],
-            StayRule::Nearly,
-            &mut tally,
-        );
-        let travel_m = head_m.max(tally.max_slave_step_m);
-        let holds = self.prove_or_revert(chain, &tally, travel_m);
-        if holds {
-            // A later sub-step may end in a veto, which takes back the whole request.
-            if !is_last {
-                self.save_positions(driven.first, tally.from..tally.to);
-            }
-            self.tally.add(&tally);
-            self.motion_bounds.accept(chain);
-        }
-        holds
+        self.tally.add(&tally);
+        true
     }
 
-    /// Makes all sub-steps of a request in one batch, if no part comes near another in any of them.
-    /// Every part is then where the sub-steps one after the other would have brought it. Returns
-    /// whether they were made.
-    pub(super) fn try_substep_batch(
+    /// Makes all of a request in one motion, as in the open, if no part comes near another in it: one long step is then
+    /// as safe as many short ones. Whether it does follows from the chain and the request alone. Returns whether it was
+    /// made.
+    pub(super) fn try_whole_motion(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
         driven: &InitiatingConnectors<D>,
-        n: usize,
     ) -> bool {
-        let is_eligible = self.rules.self_collision
-            && (2..=open::MAX_BATCH).contains(&n)
-            && can_only_self_collide(chain, obstacles, driven)
-            && SeparationBounds::has_enough_rods(chain);
-        let k = driven.first;
-        let from = driven.positions(chain);
-        // Sub-steps below the least move are skipped one by one, and must not be in a batch.
-        let is_long = distance(from[0], driven.to[0]) > 2.0 * n as f64 * chain.min_move_m();
-        if !is_eligible || !is_long || !self.request_proofs.is_due() {
+        if !self.rules.self_collision || !can_only_self_collide(chain, obstacles, driven) {
             return false;
         }
+        let tally = self.pull_and_prove(chain, driven, StayRule::Exactly);
+        if let Some(tally) = &tally {
+            self.tally.add(tally);
+        }
+        tally.is_some()
+    }
+
+    /// Moves the chain as in the open; the tally of it, or none if the motion is not proven to be allowed and was taken
+    /// back.
+    fn pull_and_prove(
+        &mut self,
+        chain: &mut Chain<D>,
+        driven: &InitiatingConnectors<D>,
+        stays: StayRule,
+    ) -> Option<MotionEffects> {
         self.motion_bounds.record(chain);
-        let mut tally = MotionEffects::start(k);
-        let mut to = [driven.to[0]; open::MAX_BATCH];
-        for (j, to) in to[..n].iter_mut().enumerate() {
-            *to = driven.positions_at(from, [j + 1, n])[0];
-        }
-        let travel_m = open::pull_through_targets(chain, k, &to[..n], &mut tally);
-        let holds = self.prove_or_revert(chain, &tally, travel_m);
-        if holds {
-            self.tally.add(&tally);
-            self.motion_bounds.accept(chain);
-        }
-        self.request_proofs.record(holds);
-        holds
+        let mut tally = MotionEffects::start(driven.first);
+        let head_m = distance(chain.points()[driven.first], driven.to[0]);
+        open::pull_chain_by_connector(chain, driven.first, driven.to[0], stays, &mut tally);
+        let travel_m = head_m.max(tally.max_slave_step_m);
+        self.prove_or_revert(chain, &tally, travel_m).then_some(tally)
     }
 
     /// Returns whether a motion from the recorded places, in which connectors moved by at most
@@ -128,10 +111,13 @@ impl<const D: usize> Propagator<D> {
         tally: &MotionEffects,
         travel_m: f64,
     ) -> bool {
+        let run = tally.from..tally.to;
+        let motion = ProvenMotion { moved: run.clone(), travel_m, in_turn: false };
         let holds = tally.max_slave_step_m <= self.rules.slave_step_max_m
-            && self.motion_bounds.allows(chain, travel_m);
-        if !holds {
-            let run = tally.from..tally.to;
+            && self.motion_bounds.allows(chain, &motion);
+        if holds {
+            self.motion_bounds.accept(chain, run);
+        } else {
             chain.points_mut()[run.clone()]
                 .copy_from_slice(&self.motion_bounds.recorded_points()[run]);
             self.motion_bounds.revert(travel_m);
@@ -148,7 +134,7 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         driven: &InitiatingConnectors<D>,
     ) -> bool {
-        if !SeparationBounds::has_enough_rods(chain) || !self.proofs.is_due() {
+        if !self.proofs.is_due() {
             return false;
         }
         let rotated = self.tally.rotated;
@@ -158,8 +144,9 @@ impl<const D: usize> Propagator<D> {
         // A rod that turns past an obstacle may have to turn past a part as well.
         let holds = followed.is_ok() && self.tally.rotated == rotated && self.are_separated(chain);
         if holds {
+            let moved = self.tentative.moved_range();
             self.commit(chain, driven);
-            self.motion_bounds.accept(chain);
+            self.motion_bounds.accept(chain, moved);
         }
         self.tally.rotated = rotated;
         self.proofs.record(holds);
@@ -174,7 +161,8 @@ impl<const D: usize> Propagator<D> {
         let travel_m = moves.map(|(new, old)| distance(*new, *old)).fold(0.0, f64::max);
         // The bounds measure a chain, so it is moved for them and put back.
         chain.points_mut()[run.clone()].copy_from_slice(self.tentative.positions());
-        let are_separated = self.motion_bounds.allows(chain, travel_m);
+        let motion = ProvenMotion { moved: run.clone(), travel_m, in_turn: true };
+        let are_separated = self.motion_bounds.allows(chain, &motion);
         chain.points_mut()[run.clone()].copy_from_slice(&self.motion_bounds.recorded_points()[run]);
         if !are_separated {
             self.motion_bounds.revert(travel_m);

@@ -23,9 +23,10 @@
 //!     `a_veto_names_a_constraint_without_which_it_is_gone_or_elsewhere`
 //! 16. pushed, no chain runs into itself: [`laws`] `a_chain_that_is_pushed_never_runs_into_itself`; pulled through
 //!     a corridor, none objects: `ground/corridor/pull_tests.rs` of `sidestep-chain`
-//! 17. joints to connectors and back: `kinematics/tests.rs` of `sidestep-arms`,
+//! 17. no two parts of a chain pass through each other, whatever their proportions: [`own_body`]
+//! 18. joints to connectors and back: `kinematics/tests.rs` of `sidestep-arms`,
 //!     `joint_values_come_back_from_connectors_where_they_are_determined`
-//! 18. one connector, one rod, coincidence, no motion, NaN, a base inside: [`degenerate`]
+//! 19. one connector, one rod, coincidence, no motion, NaN, a base inside: [`degenerate`]
 
 use super::*;
 use crate::chain::{Connector, Mobility, Rod};
@@ -38,6 +39,7 @@ use proptest::prelude::*;
 mod apart;
 mod degenerate;
 mod laws;
+mod own_body;
 mod reaction;
 mod symmetry;
 mod tunnel;

@@ -19,7 +19,7 @@ fn near<const D: usize>(seed: u64) -> Obstacles<D> {
 fn led_both_ways<const D: usize>(
     seed: u64,
     propagator: &mut Propagator<D>,
-    [here, there]: [&Obstacles<D>; 2],
+    obstacles: &Obstacles<D>,
 ) -> [usize; 2] {
     let mut numbers = TestRng::new(seed);
     let n_rods = 8 + (40.0 * numbers.unit()) as usize;
@@ -37,8 +37,8 @@ fn led_both_ways<const D: usize>(
         let mode =
             if numbers.unit() < 0.5 { VetoEffect::Exact } else { VetoEffect::AsFarAsPossible };
         let request = MotionRequest { mode, ..MotionRequest::from_operator(k, to) };
-        let outcome = propagator.propagate(&mut apart, here, &request).unwrap();
-        assert_eq!(outcome, looking.propagate(&mut looked, there, &request).unwrap(), "{seed}");
+        let outcome = propagator.propagate(&mut apart, obstacles, &request).unwrap();
+        assert_eq!(outcome, looking.propagate(&mut looked, obstacles, &request).unwrap(), "{seed}");
         assert_eq!(bits(&apart), bits(&looked), "{seed}");
         if outcome.veto().is_some() {
             vetoes += 1;
@@ -53,15 +53,12 @@ fn lead_many(seeds: std::ops::Range<u64>) {
     // One propagator for all, because its memory of other chains must not matter.
     let (mut plane, mut space) = (Propagator::default(), Propagator::default());
     let mut sum = [0, 0];
-    let nowhere = (Obstacles::default(), Obstacles::default());
     for seed in seeds {
         for [motions, vetoes] in [
-            led_both_ways::<2>(seed, &mut plane, [&nowhere.0, &far()]),
-            led_both_ways::<3>(seed, &mut space, [&nowhere.1, &far()]),
-            led_both_ways::<2>(seed, &mut plane, [&far(); 2]),
-            led_both_ways::<3>(seed, &mut space, [&far(); 2]),
-            led_both_ways::<2>(seed, &mut plane, [&near(seed); 2]),
-            led_both_ways::<3>(seed, &mut space, [&near(seed); 2]),
+            led_both_ways::<2>(seed, &mut plane, &far()),
+            led_both_ways::<3>(seed, &mut space, &far()),
+            led_both_ways::<2>(seed, &mut plane, &near(seed)),
+            led_both_ways::<3>(seed, &mut space, &near(seed)),
         ] {
             sum = [sum[0] + motions, sum[1] + vetoes];
         }
@@ -73,6 +70,52 @@ fn lead_many(seeds: std::ops::Range<u64>) {
 #[test]
 fn a_chain_in_its_own_way_moves_the_same_whether_or_not_its_parts_are_looked_at() {
     lead_many(0..20);
+}
+
+/// Alone, a chain whose parts stay apart moves as if its own body were nothing to it, however it has moved before.
+#[test]
+fn alone_a_chain_that_does_not_meet_itself_moves_as_without_its_own_body() {
+    let mut solid = Propagator::<3>::new(own());
+    let mut open = Propagator::<3>::default();
+    for seed in 0..8 {
+        let rod = Rod::with_fixed_length(0.05, 0.008);
+        let n_rods = 30 + 40 * seed as usize;
+        let start = Chain::straight([0.0; 3], [-1.0, 0.0, 0.0], n_rods, rod, Connector::free(0.02));
+        let mut walk = Wanderer::new(seed);
+        let mut with = start.unwrap();
+        let mut without = with.clone();
+        for _ in 0..40 {
+            let request = MotionRequest::from_operator(0, walk.next(with.points()[0], 0.012));
+            let outcome = solid.propagate(&mut with, &Obstacles::default(), &request).unwrap();
+            assert!(outcome.motion().is_some(), "{seed}");
+            open.propagate(&mut without, &Obstacles::default(), &request).unwrap();
+            assert_eq!(bits(&with), bits(&without), "{seed}");
+        }
+    }
+}
+
+/// What a propagator has moved before does not matter.
+#[test]
+fn alone_a_chain_moves_the_same_whatever_was_moved_before() {
+    let mut used = Propagator::<2>::new(own());
+    for seed in 0..40 {
+        let mut numbers = TestRng::new(seed);
+        let radius_m = numbers.uniform(0.01, 0.4);
+        let rod = Rod { min_m: 0.9, max_m: 1.0, radius_m: 0.5 * radius_m };
+        let mut chain = crooked::<2>(seed, 4 + 4 * seed as usize, rod, radius_m);
+        let k = (chain.points().len() as f64 * numbers.unit()) as usize;
+        let mut walk = Wanderer::new(seed);
+        for _ in 0..15 {
+            let to = walk.next(chain.points()[k], numbers.uniform(0.0, 0.3));
+            let request = MotionRequest::from_operator(k, to);
+            let mut other = chain.clone();
+            let outcome = used.propagate(&mut chain, &Obstacles::default(), &request).unwrap();
+            let fresh =
+                Propagator::new(own()).propagate(&mut other, &Obstacles::default(), &request);
+            assert_eq!(fresh.unwrap(), outcome, "{seed}");
+            assert_eq!(bits(&other), bits(&chain), "{seed}");
+        }
+    }
 }
 
 #[test]
