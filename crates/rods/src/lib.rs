@@ -41,7 +41,9 @@ pub use motion_context::{
     BEND_TOLERANCE_RAD, IncompleteVeto, SKIN_M, TOLERANCE_M, contact_distance_m, is_length_allowed,
 };
 pub use obstacle::{Obstacle, Obstacles, bounds_around, outline_walls};
-pub use own_body::{ChainPart, NearestOwnParts, find_own_passage, nearest_own_parts};
+pub use own_body::{
+    ChainPart, NearestOwnParts, find_own_passage, is_own_path_clear, nearest_own_parts, part_pairs,
+};
 pub use propagate::{Propagator, local_solver};
 pub use reach::{ReachOutcome, ReachRequest, reach_target};
 pub use reaction::{MasterMove, Reaction};

@@ -136,7 +136,7 @@ impl<const D: usize> Chain<D> {
 
 /// Returns the pairs of parts that two rods stand for, `first` before `second`: each rod stands for the connector at its
 /// start as well, and the last rod of the chain for the one at its end, so that no pair is missed or comes twice.
-pub(super) fn part_pairs(
+pub fn part_pairs(
     first: usize,
     second: usize,
     rods: usize,
@@ -247,6 +247,17 @@ impl<const D: usize> ChainSweep<'_, D> {
         let pair = RodPairSweep { one: self.part_sweep(one), other: self.part_sweep(other) };
         !pair.is_clear(separation_m)
     }
+}
+
+/// Returns whether two parts of a chain stay apart on their way when every connector goes straight from `before` to
+/// `after`; see [`find_own_passage`].
+pub fn is_own_path_clear<const D: usize>(
+    chain: &Chain<D>,
+    [before, after]: [&[Point<D>]; 2],
+    parts: [ChainPart; 2],
+) -> bool {
+    let moved = 0..after.len();
+    !ChainSweep { chain, from: before, moved, to: after }.passes(parts)
 }
 
 /// Returns two parts of a chain that pass through each other, or nearly so, when every connector goes straight from

@@ -11,8 +11,7 @@ use super::chain::{Chain, Connector, LENGTH_TOLERANCE_M, Mobility};
 use super::geometry::{Point, distance};
 use super::obstacle::Obstacles;
 use super::propagate::Propagator;
-use super::tunneling::find_tunneling;
-use super::veto::{MotionRequest, RequestSource, RequestedMotion, Veto, VetoEffect, VetoReason};
+use super::veto::{MotionRequest, RequestSource, RequestedMotion, Veto, VetoEffect};
 use sidestep_kernel::{InputError, interrupt};
 
 /// Largest number of double passes before the search is given up. One held connector converges in few passes (a
@@ -120,7 +119,18 @@ pub fn reach_target<const D: usize>(
         chain.set_mobility(h.k, h.mobility)?;
         chain.set_connector_failed(h.k, h.failed);
     }
-    let outcome = outcome.map(|outcome| checked_path(outcome, chain, obstacles, &before, request));
+    let outcome = outcome.map(|outcome| {
+        if let ReachOutcome::Short { .. } = outcome {
+            return outcome;
+        }
+        // Each pass was checked, but not the straight path that the chain appears to take.
+        match propagator.find_path_veto(chain, obstacles, &before, request.k) {
+            None => outcome,
+            Some(veto) => {
+                ReachOutcome::Short { nearest: chain.points()[request.k], veto: Some(veto) }
+            }
+        }
+    });
     if !matches!(outcome, Ok(ReachOutcome::There { .. })) {
         chain.points_mut().copy_from_slice(&before);
     }
@@ -219,44 +229,11 @@ impl<const D: usize> ReachSolver<'_, D> {
     }
 }
 
-/// Returns the outcome of the passes; a success becomes a failure if an obstacle is on the path.
-fn checked_path<const D: usize>(
-    outcome: ReachOutcome<D>,
-    chain: &Chain<D>,
-    obstacles: &Obstacles<D>,
-    before: &[Point<D>],
-    request: &ReachRequest<D>,
-) -> ReachOutcome<D> {
-    if let ReachOutcome::Short { .. } = outcome {
-        return outcome;
-    }
-    match path_veto(chain, obstacles, before, request) {
-        None => outcome,
-        Some(veto) => ReachOutcome::Short { nearest: chain.points()[request.k], veto: Some(veto) },
-    }
-}
-
-/// Returns the veto of an obstacle between the old state and the new one: each pass was checked, but
-/// not the straight path that the chain appears to take.
-fn path_veto<const D: usize>(
-    chain: &Chain<D>,
-    obstacles: &Obstacles<D>,
-    before: &[Point<D>],
-    request: &ReachRequest<D>,
-) -> Option<Veto<D>> {
-    find_tunneling(chain, before, obstacles, 0.0).map(|tunneled| Veto {
-        by: tunneled.rod + 1,
-        from: request.k,
-        reason: VetoReason::WouldTunnel,
-        obstacle: Some(tunneled.obstacle),
-        reached: before[request.k],
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::chain::Rod;
     use super::super::obstacle::Obstacle;
+    use super::super::veto::VetoReason;
     use super::*;
 
     fn arm() -> Chain<2> {

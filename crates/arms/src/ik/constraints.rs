@@ -3,8 +3,8 @@
 
 use sidestep_rods::geometry::{Aabb, Point, angle_between_rad, between_segments, distance, sub};
 use sidestep_rods::{
-    BEND_TOLERANCE_RAD, Chain, Obstacle, Obstacles, Veto, VetoReason, contact_distance_m,
-    is_length_allowed,
+    BEND_TOLERANCE_RAD, Chain, ChainPart, Obstacle, Obstacles, Veto, VetoReason,
+    contact_distance_m, is_length_allowed, part_pairs,
 };
 use std::f64::consts::PI;
 
@@ -56,7 +56,7 @@ impl<const D: usize> ConstraintChecker<'_, D> {
 
     fn check_rod(&self, points: &[Point<D>], i: usize) -> Option<(usize, VetoReason, Option<u32>)> {
         if !self.has_moved(points, i) && !self.has_moved(points, i + 1) {
-            return None;
+            return self.check_own_body(points, i);
         }
         if !is_length_allowed(self.chain.rods()[i], distance(points[i], points[i + 1])) {
             return Some((i + 1, VetoReason::Mobility, None));
@@ -71,8 +71,20 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         if hit.is_some() {
             return Some((i + 1, VetoReason::BothSidesBlocked, hit));
         }
+        self.check_own_body(points, i)
+    }
+
+    /// Checks rod `i` against the later parts of the chain, of which one or the other has moved.
+    fn check_own_body(
+        &self,
+        points: &[Point<D>],
+        i: usize,
+    ) -> Option<(usize, VetoReason, Option<u32>)> {
         let hits_itself = self.self_collision
-            && self.own_pairs(points, i, 0.0).any(|pair| pair.depth_m() > pair.slack_m());
+            && self.own_pairs(points, i, 0.0).any(|pair| {
+                let mut ends = pair.ends.into_iter().flatten();
+                ends.any(|k| self.has_moved(points, k)) && pair.depth_m() > pair.slack_m()
+            });
         hits_itself.then_some((i + 1, VetoReason::SelfCollision, None))
     }
 
@@ -101,8 +113,7 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         self.obstacles.visit(&Aabb::from_points(ends).grown(by_m), visit);
     }
 
-    /// Returns the later parts of the chain that rod `i` and its inner connector may run into: rods
-    /// more than two apart, connectors more than one.
+    /// Returns the later parts of the chain that rod `i` and its inner connector may run into.
     pub(super) fn own_pairs<'a>(
         &'a self,
         points: &'a [Point<D>],
@@ -121,50 +132,21 @@ impl<const D: usize> ConstraintChecker<'_, D> {
         Aabb::from_points(&[points[i], points[i + 1]]).grown(by_m)
     }
 
-    fn own_pairs_of(
-        &self,
-        points: &[Point<D>],
+    /// Returns the pairs that two rods with their connectors make, except those that share a joint.
+    fn own_pairs_of<'a>(
+        &'a self,
+        points: &'a [Point<D>],
         i: usize,
         j: usize,
-    ) -> impl Iterator<Item = OwnPair<D>> + use<D> {
-        let rod = OwnBodyPart::rod(self.chain, points, i);
-        let other_rod = OwnBodyPart::rod(self.chain, points, j);
-        let ball = OwnBodyPart::connector(self.chain, points, i);
-        let other_ball = OwnBodyPart::connector(self.chain, points, j + 1);
-        [
-            (j > i + 2).then(|| rod.pair(&other_rod)),
-            (j > i + 1).then(|| rod.pair(&other_ball)),
-            (j > i + 1).then(|| ball.pair(&other_rod)),
-            Some(ball.pair(&other_ball)),
-        ]
-        .into_iter()
-        .flatten()
-    }
-}
-
-/// A rod of a chain, or a connector as a rod without length.
-struct OwnBodyPart<const D: usize> {
-    ends: [usize; 2],
-    at: [Point<D>; 2],
-    radius_m: f64,
-}
-
-impl<const D: usize> OwnBodyPart<D> {
-    fn rod(chain: &Chain<D>, points: &[Point<D>], i: usize) -> Self {
-        let at = [points[i], points[i + 1]];
-        Self { ends: [i, i + 1], at, radius_m: chain.rods()[i].radius_m }
-    }
-
-    fn connector(chain: &Chain<D>, points: &[Point<D>], i: usize) -> Self {
-        Self { ends: [i, i], at: [points[i]; 2], radius_m: chain.connectors()[i].radius_m }
-    }
-
-    fn pair(&self, other: &Self) -> OwnPair<D> {
-        OwnPair {
-            ends: [self.ends, other.ends],
-            at: [self.at, other.at],
-            keep_m: self.radius_m + other.radius_m,
-        }
+    ) -> impl Iterator<Item = OwnPair<D>> + 'a {
+        part_pairs(i, j, self.chain.rods().len()).filter_map(|[one, other]| {
+            let ends = |part: ChainPart| [part.connector(), part.last_connector()];
+            Some(OwnPair {
+                ends: [ends(one), ends(other)],
+                at: [one.ends(points), other.ends(points)],
+                keep_m: self.chain.min_separation_m(one, other)?,
+            })
+        })
     }
 }
 

@@ -1,9 +1,7 @@
-//! Distances of a chain's parts from the obstacles around them, and from each other.
+//! Distances of a chain's parts from the obstacles around them.
 
-use sidestep_rods::geometry::{
-    Aabb, Point, between_segments, distance, nearest_on_segment, scaled, sub,
-};
-use sidestep_rods::{Chain, Obstacles, RodBvh};
+use sidestep_rods::geometry::{Aabb, Point, scaled, sub};
+use sidestep_rods::{Chain, Obstacles};
 
 /// Distance by which searches go beyond the one that counts, meters: far more than rounding.
 const MARGIN_M: f64 = 1e-9;
@@ -77,101 +75,11 @@ pub(crate) fn min_clearance<const D: usize>(
     least
 }
 
-/// Returns the least gap between two parts of a chain that are no neighbors, up to `within_m`; negative
-/// where they overlap. Neighbors are connectors of one rod, rods of one connector, and a connector and the
-/// two rods to each of its sides. `tree` is a buffer.
-pub(crate) fn self_gap_m<const D: usize>(
-    chain: &Chain<D>,
-    tree: &mut RodBvh<D>,
-    within_m: f64,
-) -> f64 {
-    let points = chain.points();
-    let connectors = chain.connectors();
-    let rods = chain.rods();
-    tree.refit((0..rods.len()).map(|rod| part_bounds(chain, rod, 0.0)));
-    let mut least_m = within_m;
-    for rod in 0..rods.len() {
-        let near = part_bounds(chain, rod, least_m);
-        tree.visit(&near, |other| {
-            // Each pair of rods is visited twice, and measured once.
-            if other >= rod + 2 {
-                let apart_m = between_segments(rod_ends(chain, rod), rod_ends(chain, other));
-                let apart_m = apart_m.distance_m;
-                least_m = least_m.min(apart_m - rods[rod].radius_m - rods[other].radius_m);
-            }
-            // The tree holds rods: each stands for the connector at its start, and the last one for its end as well.
-            let is_last = other + 1 == rods.len();
-            for k in other..other + 1 + usize::from(is_last) {
-                let at = points[k];
-                let radius_m = connectors[k].radius_m;
-                if k + 1 < rod || k > rod + 2 {
-                    let [a, b] = rod_ends(chain, rod);
-                    let apart_m = distance(at, nearest_on_segment(at, a, b));
-                    least_m = least_m.min(apart_m - radius_m - rods[rod].radius_m);
-                }
-                if k >= rod + 2 {
-                    let apart_m = distance(at, points[rod]);
-                    least_m = least_m.min(apart_m - radius_m - connectors[rod].radius_m);
-                }
-            }
-        });
-    }
-    least_m
-}
-
-#[inline]
-fn rod_ends<const D: usize>(chain: &Chain<D>, rod: usize) -> [Point<D>; 2] {
-    [chain.points()[rod], chain.points()[rod + 1]]
-}
-
-/// Returns the box around a rod and the connectors at its ends, grown by `by_m`: rods are no thicker than their
-/// connectors.
-#[inline]
-fn part_bounds<const D: usize>(chain: &Chain<D>, rod: usize, by_m: f64) -> Aabb<D> {
-    let connectors = chain.connectors();
-    let radius_m = connectors[rod].radius_m.max(connectors[rod + 1].radius_m);
-    Aabb::from_points(&rod_ends(chain, rod)).grown((radius_m + by_m).max(0.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
     use sidestep_rods::{Connector, Obstacle, Rod};
-
-    /// The same by looking at every pair.
-    fn every_pair_m(chain: &Chain<2>) -> f64 {
-        let (points, connectors, rods) = (chain.points(), chain.connectors(), chain.rods());
-        let ends = |rod: usize| [points[rod], points[rod + 1]];
-        let mut least_m = f64::INFINITY;
-        for i in 0..rods.len() {
-            for j in i + 2..rods.len() {
-                let apart_m = between_segments(ends(i), ends(j)).distance_m;
-                least_m = least_m.min(apart_m - rods[i].radius_m - rods[j].radius_m);
-            }
-            for k in (0..points.len()).filter(|k| k + 1 < i || *k > i + 2) {
-                let [a, b] = ends(i);
-                let apart_m = distance(points[k], nearest_on_segment(points[k], a, b));
-                least_m = least_m.min(apart_m - connectors[k].radius_m - rods[i].radius_m);
-            }
-        }
-        for i in 0..points.len() {
-            for j in i + 2..points.len() {
-                let apart_m = distance(points[i], points[j]);
-                least_m = least_m.min(apart_m - connectors[i].radius_m - connectors[j].radius_m);
-            }
-        }
-        least_m
-    }
-
-    #[test]
-    fn parts_that_cross_overlap_by_their_thickness() {
-        let rod = Rod { min_m: 0.5, max_m: 2.0, radius_m: 0.02 };
-        let points = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.5, -0.5]];
-        let chain = Chain::new(points, vec![Connector::free(0.05); 4], vec![rod; 3]).unwrap();
-        let gap_m = self_gap_m(&chain, &mut RodBvh::default(), 1.0);
-        assert!((gap_m + 0.04).abs() < 1e-12, "{gap_m}");
-    }
 
     proptest! {
         #[test]
@@ -193,19 +101,6 @@ mod tests {
                 least = if apart_m < least.0 { (apart_m, k) } else { least };
             }
             prop_assert_eq!(min_clearance(&chain, &obstacles, look_m, with_rods), least);
-        }
-
-        #[test]
-        fn the_least_gap_of_a_chain_is_that_of_its_nearest_pair(
-            points in prop::collection::vec(prop::array::uniform2(-2.0..2.0f64), 3..14),
-            radius_m in 0.01..0.3f64, within_m in 0.01..1.0f64,
-        ) {
-            let n = points.len();
-            let rod = Rod { min_m: 1e-9, max_m: 9.0, radius_m: 0.2 * radius_m };
-            let chain = Chain::new(points, vec![Connector::free(radius_m); n], vec![rod; n - 1]);
-            let Ok(chain) = chain else { return Ok(()) };
-            let gap_m = self_gap_m(&chain, &mut RodBvh::default(), within_m);
-            prop_assert!((gap_m - every_pair_m(&chain).min(within_m)).abs() < 1e-12);
         }
     }
 

@@ -21,7 +21,7 @@ pub struct ChainTally {
     pub steps: u64,
     /// Vetoes that drivers received, by [`VetoReason::ALL`].
     pub vetoes: [u64; VetoReason::ALL.len()],
-    /// Steps at whose end some part was in an obstacle,
+    /// Steps at whose end some part was in an obstacle, or in another part of the chain,
     pub penetrations: u64,
     /// how many in a row ended so up to the last step,
     pub inside_steps: u64,
@@ -31,9 +31,11 @@ pub struct ChainTally {
     pub is_escaping: bool,
     /// Least distance of any part from obstacles, meters; infinite if none came near.
     pub min_clearance_m: f64,
-    /// Least distance between parts of the chain that are no neighbors, while they are solid to each other,
+    /// Least gap between parts of the chain that share no joint, while they are solid to each other,
     /// meters; negative where they overlapped, infinite if none came near.
     pub min_own_gap_m: f64,
+    /// Depth of the deepest overlap of two parts of the chain when it was last measured, meters.
+    pub own_depth_m: f64,
     /// Greatest amount by which a rod was outside its limits while the chain was whole, meters.
     pub max_rod_violation_m: f64,
     /// Longest distance that a connector other than the initiator moved in one sub-step, meters.
@@ -256,6 +258,7 @@ impl Default for ChainTally {
             is_escaping: false,
             min_clearance_m: f64::INFINITY,
             min_own_gap_m: f64::INFINITY,
+            own_depth_m: 0.0,
             max_rod_violation_m: 0.0,
             max_slave_step_m: 0.0,
             max_speed_m_s: 0.0,
@@ -306,8 +309,9 @@ metrics! {
         pub steps: u64 => "steps",
         /// Vetoes that initiators received.
         pub vetoes: u64 => "vetoes",
-        /// Steps at whose end some part was deeper than 1e-6 m in an obstacle.
-        pub penetrations: u64 => "steps inside an obstacle",
+        /// Steps at whose end some part was deeper than 1e-6 m in an obstacle, or in another part of its chain (of chains of
+        /// more than 32 rods: by a measurement in every 16th cycle).
+        pub penetrations: u64 => "steps inside an obstacle or its own body",
         /// Least distance of any part from obstacles; none if nothing came near. In meters.
         pub min_clearance_m: Option<f64> => "least clearance",
         /// Greatest amount by which a rod was outside its limits. In meters.
@@ -326,9 +330,10 @@ metrics! {
         pub max_slave_step_m: f64 => "longest way of a follower in a sub-step",
         /// Greatest speed of any connector. In meters per second.
         pub max_speed_m_s: f64 => "greatest speed",
-        /// Most steps in a row at whose ends some part of one chain was deeper than 1e-6 m in an obstacle.
+        /// Most steps in a row at whose ends some part of one chain was deeper than 1e-6 m in an obstacle, or in another of
+        /// its parts.
         pub longest_inside_steps: u64 => "steps inside in a row, at most",
-        /// Least distance between parts of a chain that are no neighbors (of more than 32 rods: in every 16th cycle); below
+        /// Least gap between parts of a chain that share no joint (of more than 32 rods: in every 16th cycle); below
         /// 0 where they overlapped; none if none came near. In meters, while they are solid to each other.
         pub min_own_gap_m: Option<f64> => "least distance of own parts",
         /// Tasks done, targets reached.

@@ -1,9 +1,10 @@
 //! Remarks on a valid scenario: effects that will surprise its author. `sidestep check` shows them.
 
 use super::scenario::ChainScenario;
+use super::scenario::own_overlap_text;
 use super::world::{ChainChangeKind, ChainSpec, ChainWorld};
 use sidestep_arms::kinematics::JointMotionKind;
-use sidestep_rods::Mobility;
+use sidestep_rods::{Mobility, RodBvh};
 use sidestep_scenario::Remark;
 
 /// Returns remarks on files, then on joints, on the network, and on rules without effect.
@@ -15,7 +16,30 @@ pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark
     // One of them is enough: all chains talk over the same network.
     let slow = chains.find_map(|(k, spec)| slow_network_remark(&compiled.world, k, spec));
     let of_files = ground.chain(files);
-    of_files.chain(unlimited).chain(slow).chain(unused_rules(compiled)).collect()
+    let overlap = own_overlap_remark(&compiled.world);
+    of_files.chain(unlimited).chain(slow).chain(overlap).chain(unused_rules(compiled)).collect()
+}
+
+/// Returns a warning on chains whose own parts overlap at the start, where that is allowed.
+fn own_overlap_remark<const D: usize>(world: &ChainWorld<D>) -> Option<Remark> {
+    if !world.rules.self_collision {
+        return None;
+    }
+    let mut tree = RodBvh::default();
+    let mut overlaps = world
+        .chains
+        .iter()
+        .enumerate()
+        .filter_map(|(k, spec)| Some((k, own_overlap_text(&spec.start, &mut tree)?)));
+    let (k, words) = overlaps.next()?;
+    let more = match overlaps.count() {
+        0 => String::new(),
+        n => format!(", and {n} more chains likewise"),
+    };
+    let words = format!(
+        "chain {k} {words}{more}; parts that overlap at the start may come apart, and go no deeper into each other"
+    );
+    Some(Remark::warning(format!("chains.{k}"), words))
 }
 
 /// Returns what was not taken as it stood in the files of an arm.

@@ -36,6 +36,7 @@ use sidestep_scenario::{
     ByName, Head, Integer, LeftOpen, Number, Rule, Sections, Source, Spanned, invalid_value, schema,
 };
 pub(crate) use spec::ScenarioSpec;
+pub(super) use starts::own_overlap_text;
 use std::borrow::Cow;
 use std::sync::Arc;
 

@@ -129,7 +129,7 @@ fn motion_lines(m: &Metrics) -> KeyValues {
         n => {
             let in_a_row = group_thousands(m.longest_inside_steps);
             format!(
-                "{} steps with a part in an obstacle, up to {in_a_row} in a row",
+                "{} steps with a part in an obstacle or in its own body, up to {in_a_row} in a row",
                 group_thousands(n)
             )
         }

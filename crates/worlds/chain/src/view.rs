@@ -287,7 +287,7 @@ fn describe(event: &Event) -> (Severity, &'static str, String) {
     match event.kind {
         EventKind::Veto => (Severity::Warning, "m", format!("objects: {reason}{because}")),
         EventKind::Penetration => {
-            let what = what.unwrap_or_else(|| "an obstacle".into());
+            let what = what.unwrap_or_else(|| "an obstacle or its own body".into());
             (Severity::Error, "m", format!("is {value:.4} m inside {what}"))
         }
         EventKind::Clear => (Severity::Info, NO_VALUE, "is clear of obstacles again".into()),

@@ -70,15 +70,18 @@ fn judge<const D: usize>(chain: &Chain<D>, before: &[Point<D>], what: &str) {
             };
             assert!(!passes(&at), "{what}: rods {i} and {j} pass through each other");
         }
-        // Neighbors in the plane pass where the rods turn over each other.
+        // Neighbors in the plane pass where one is folded over the other.
         if D == 2 && i + 1 < rods {
-            let turn = |points: &[Point<D>]| {
-                let into = sub(points[i + 1], points[i]);
-                let out = sub(points[i + 2], points[i + 1]);
-                (cross_2d(into, out), dot(into, out))
+            let turn = |k: usize| {
+                let time = k as f64 / LOOKS as f64;
+                let [a, b, c] = [i, i + 1, i + 2].map(|k| lerp(before[k], after[k], time));
+                (cross_2d(sub(b, a), sub(c, b)), dot(sub(b, a), sub(c, b)))
             };
-            let [(was, _), (is, ahead)] = [turn(before), turn(after)];
-            assert!(was * is >= 0.0 || ahead > 0.0, "{what}: rods {i} and {} turn over", i + 1);
+            let folds = (0..LOOKS).any(|k| {
+                let [(was, was_ahead), (is, is_ahead)] = [turn(k), turn(k + 1)];
+                was * is < 0.0 && was_ahead < 0.0 && is_ahead < 0.0
+            });
+            assert!(!folds, "{what}: rods {i} and {} fold over each other", i + 1);
         }
     }
 }

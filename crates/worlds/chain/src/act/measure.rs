@@ -1,11 +1,11 @@
 //! Measures of a chain at the end of each of its cycles.
 
 use super::{ChainContext, ChainCycleState};
-use crate::clearance::{min_clearance, self_gap_m};
+use crate::clearance::min_clearance;
 use crate::events::EventKind;
-use crate::metrics::PENETRATION_THRESHOLD_M;
-use sidestep_rods::RodBvh;
+use crate::metrics::{ChainTally, PENETRATION_THRESHOLD_M};
 use sidestep_rods::geometry::distance;
+use sidestep_rods::{Chain, RodBvh, nearest_own_parts};
 
 /// Number of rods up to which a chain's gap to itself is measured in each cycle: the measurement takes time that
 /// grows faster than the chain.
@@ -37,17 +37,32 @@ pub(super) fn measure_chain<const D: usize>(
     let is_due =
         chain.rods().len() <= MAX_MEASURED_RODS || now.is_multiple_of(MEASURE_INTERVAL_CYCLES);
     if is_whole && is_due && world.rules.self_collision {
-        let within_m = tally.min_own_gap_m.min(look_m);
-        let gap_m = self_gap_m(chain, own, within_m);
-        tally.min_own_gap_m = if gap_m < within_m { gap_m } else { tally.min_own_gap_m };
+        measure_own_body(chain, tally, own, look_m);
     }
     let (least_m, part) = min_clearance(chain, obstacles, look_m, is_whole);
     if least_m < look_m {
         tally.min_clearance_m = tally.min_clearance_m.min(least_m);
     }
-    let is_inside = least_m.min(robots_gap_m) < -PENETRATION_THRESHOLD_M;
+    let is_in_obstacle = least_m.min(robots_gap_m) < -PENETRATION_THRESHOLD_M;
+    let own_depth_m = if is_whole { tally.own_depth_m } else { 0.0 };
+    let is_inside = is_in_obstacle || own_depth_m > PENETRATION_THRESHOLD_M;
     if tally.record_inside(is_inside) {
         let kind = if is_inside { EventKind::Penetration } else { EventKind::Clear };
-        acting.sink.record(chain, kind, part, (-least_m).max(0.0));
+        acting.sink.record(chain, kind, part, own_depth_m.max(-least_m).max(0.0));
     }
+}
+
+/// Measures the gap of a chain to itself: the least of the run, and the depth of an overlap now.
+fn measure_own_body<const D: usize>(
+    chain: &Chain<D>,
+    tally: &mut ChainTally,
+    own: &mut RodBvh<D>,
+    look_m: f64,
+) {
+    // An overlap counts in each cycle that it lasts, a gap only if it is the least so far.
+    let within_m = tally.min_own_gap_m.min(look_m).max(0.0);
+    let nearest = nearest_own_parts(chain, own, within_m);
+    let gap_m = nearest.map_or(f64::INFINITY, |nearest| nearest.gap_m);
+    tally.min_own_gap_m = tally.min_own_gap_m.min(gap_m);
+    tally.own_depth_m = (-gap_m).max(0.0);
 }

@@ -11,8 +11,8 @@ use sidestep_arms::plan::{
     PlanningQuery, plan, plan_joints,
 };
 use sidestep_kernel::InputError;
-use sidestep_rods::find_tunneling;
 use sidestep_rods::geometry::{Point, distance};
+use sidestep_rods::{RodBvh, find_own_passage, find_tunneling};
 use std::collections::VecDeque;
 
 /// Least fraction of a segment of the path that a cycle is worth.
@@ -183,7 +183,7 @@ fn follow_joint_path<const D: usize>(
     (!path.is_empty()).then_some(path)
 }
 
-/// Moves the chain to the next posture of a planned path, unless it would tunnel through something.
+/// Moves the chain to the next posture of a planned path, unless it would tunnel through something or pass through itself.
 fn move_along<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut ChainBodyState<D>,
@@ -193,7 +193,10 @@ fn move_along<const D: usize>(
     let chain = &mut body.chain;
     let agent = initiator.task.agent;
     chain.points_mut().copy_from_slice(next);
-    if find_tunneling(chain, from, initiator.context.obstacles, 0.0).is_some() {
+    let ChainContext { world, obstacles, .. } = initiator.context;
+    let meets_itself = world.rules.self_collision
+        && find_own_passage(chain, from, &mut RodBvh::default()).is_some();
+    if meets_itself || find_tunneling(chain, from, obstacles, 0.0).is_some() {
         chain.points_mut().copy_from_slice(from);
         return false;
     }

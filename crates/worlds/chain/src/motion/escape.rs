@@ -20,12 +20,12 @@ use literal::LiteralEscape;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
+pub(crate) use sidestep_rods::ChainPart;
 use sidestep_rods::geometry::{Point, norm};
 use sidestep_rods::{Chain, Obstacle, Obstacles, Propagator, ReactionRules, Veto};
 pub use simultaneous::EscapePlan;
 pub(crate) use simultaneous::LeadMotion;
 use simultaneous::SimultaneousEscape;
-pub(crate) use threat::ChainPart;
 
 /// The method by which a chain escapes from moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]

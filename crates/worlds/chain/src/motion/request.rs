@@ -5,8 +5,7 @@ use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
     Chain, CompletedMotion, Connector, Mobility, MotionOutcome, MotionRequest, Obstacles,
-    Propagator, ReachOutcome, ReachRequest, RequestedMotion, Veto, VetoReason, find_tunneling,
-    reach_target,
+    Propagator, ReachOutcome, ReachRequest, RequestedMotion, Veto, VetoReason, reach_target,
 };
 
 /// What moves a chain, and what it may meet.
@@ -211,7 +210,7 @@ const SLOWED_FRACTION: f64 = 0.9;
 /// posture that reaches the target, and the chain moves straight to it if neither the posture nor the motion is
 /// blocked.
 fn move_by_ik<const D: usize>(
-    scene: &MotionEnvironment<'_, D>,
+    scene: &mut MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
     before: &[Point<D>],
     order: &ReachRequest<D>,
@@ -235,14 +234,9 @@ fn move_by_ik<const D: usize>(
         return Ok(MotionOutcome::Vetoed(objection));
     }
     chain.points_mut().copy_from_slice(&answer.points);
-    if let Some(passed) = find_tunneling(chain, before, scene.obstacles, 0.0) {
+    if let Some(veto) = scene.propagator.find_path_veto(chain, scene.obstacles, before, k) {
         chain.points_mut().copy_from_slice(before);
-        return Ok(MotionOutcome::Vetoed(Veto {
-            by: passed.rod,
-            obstacle: Some(passed.obstacle),
-            reason: VetoReason::WouldTunnel,
-            ..objection
-        }));
+        return Ok(MotionOutcome::Vetoed(Veto { reached: objection.reached, ..veto }));
     }
     Ok(MotionOutcome::Moved(motion_since(before, chain, k)))
 }

@@ -6,7 +6,7 @@ use super::obstacles::ScenarioObstacles;
 use super::{ChainScenarioCompiler, MIN_REACH_M};
 use sidestep_kernel::{EntitySlot, InputError};
 use sidestep_rods::geometry::Aabb;
-use sidestep_rods::{Chain, Obstacle, Obstacles};
+use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh, nearest_own_parts};
 use std::ops::Range;
 
 /// A part of a chain that is inside a solid.
@@ -19,7 +19,7 @@ struct StartOverlap {
 }
 
 impl<const D: usize> ChainScenarioCompiler<'_, D> {
-    /// Refuses chains that start in obstacles, or in each other, because every motion out of there
+    /// Refuses chains that start in obstacles, in each other, or in themselves, because every motion out of there
     /// would pass through a solid.
     pub(super) fn check_starts(
         &self,
@@ -41,6 +41,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
                 ));
             }
         }
+        self.check_own_bodies(chains)?;
         if chains.len() < 2 {
             return Ok(());
         }
@@ -62,6 +63,24 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         Ok(())
     }
 
+    /// Refuses chains whose own parts overlap at the start. The links of an arm only look like rods, so an arm is told
+    /// of it in the remarks.
+    fn check_own_bodies(&self, chains: &[ChainSpec<D>]) -> Result<(), InputError> {
+        if self.file.chain.self_collision == Some(false) {
+            return Ok(());
+        }
+        let mut tree = RodBvh::default();
+        for (slot, spec) in chains.iter().enumerate().filter(|(_, spec)| spec.arm.is_none()) {
+            if let Some(words) = own_overlap_text(&spec.start, &mut tree) {
+                let remedy = "move them apart or make them thinner, or set chain.self_collision = false, or \
+                              chain.may_start_inside = true";
+                let cause = format!("chain {slot} {words}");
+                return Err(self.source.error(self.section_span(slot), cause, remedy));
+            }
+        }
+        Ok(())
+    }
+
     fn start_overlap_error(&self, slot: usize, inside: StartOverlap, what: &str) -> InputError {
         let StartOverlap { connector, depth_m, .. } = inside;
         let cause = format!(
@@ -78,6 +97,16 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let mut spans = sections.flat_map(|s| std::iter::repeat_n(s.span(), s.get_ref().count));
         spans.nth(slot)
     }
+}
+
+/// Returns which two parts of a chain overlap most at the start, and how deep; none if none do.
+pub(crate) fn own_overlap_text<const D: usize>(
+    chain: &Chain<D>,
+    tree: &mut RodBvh<D>,
+) -> Option<String> {
+    let nearest = nearest_own_parts(chain, tree, -PENETRATION_THRESHOLD_M)?;
+    let [one, other] = nearest.parts;
+    Some(format!("begins with its {one} {:.3e} m deep in its {other}", -nearest.gap_m))
 }
 
 /// Returns the part of a chain that is deepest in anything not called `own`.

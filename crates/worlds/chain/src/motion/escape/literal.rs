@@ -5,7 +5,9 @@
 //! slaves included, is farther from its position at the start of the tick than its speed allows, and a
 //! part that only this limit keeps from escaping is reported.
 
-use super::threat::{ObstacleProximity, Threat, collect_threats, gap_m, obstacle_proximity};
+use super::threat::{
+    ObstacleProximity, Threat, collect_threats, gap_m, is_among, obstacle_proximity,
+};
 use super::{
     ChainPart, EscapeMargin, EscapeReport, ObstacleEscapeInput, ObstacleEscapeRules, TrappedPart,
 };
@@ -138,7 +140,7 @@ impl<const D: usize> LiteralEscape<D> {
 
     /// Measures the threats of some connectors and their rods again; all others are as deep as before.
     fn update_threat_depths(&mut self, tick: &ObstacleEscapeInput<'_, D>, touched: &Range<usize>) {
-        for threat in self.threats.iter_mut().filter(|t| t.part.is_among(touched)) {
+        for threat in self.threats.iter_mut().filter(|t| is_among(t.part, touched)) {
             threat.depth_m = threat_depth(tick, threat);
         }
     }
@@ -263,7 +265,7 @@ impl<const D: usize> LiteralEscape<D> {
         let bound_m = depth_m - MIN_GAIN * distance_m.min(depth_m);
         // Untouched parts are as deep as before.
         let all = self.threats.iter().enumerate();
-        let mut changed = all.filter(|(i, threat)| *i == which || threat.part.is_among(touched));
+        let mut changed = all.filter(|(i, threat)| *i == which || is_among(threat.part, touched));
         let (_, worse) = changed.find(|(i, threat)| {
             let allowed_m = if *i == which { bound_m } else { threat.depth_m.max(bound_m) };
             threat_depth(tick, threat) > allowed_m

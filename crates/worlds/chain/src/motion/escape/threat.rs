@@ -1,32 +1,12 @@
 //! The parts of a chain near a moving obstacle, with their distances.
 
 use sidestep_rods::geometry::{Aabb, Point, distance, normalized, perpendicular, sub, unit_x};
-use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh};
+use sidestep_rods::{Chain, ChainPart, Obstacle, Obstacles, RodBvh};
 use std::ops::Range;
 
-/// A part of a chain; the order breaks ties between equally deep violations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ChainPart {
-    /// The connector of this number.
-    Connector(usize),
-    /// The rod between a connector and the next.
-    Rod(usize),
-}
-
-impl ChainPart {
-    /// Returns the connector, or the one at the start of the rod.
-    pub fn connector(self) -> usize {
-        let (Self::Connector(k) | Self::Rod(k)) = self;
-        k
-    }
-
-    /// Returns whether it is one of some connectors, or a rod that ends at one of them.
-    pub(super) fn is_among(self, connectors: &Range<usize>) -> bool {
-        match self {
-            Self::Connector(k) => connectors.contains(&k),
-            Self::Rod(i) => connectors.contains(&i) || connectors.contains(&(i + 1)),
-        }
-    }
+/// Returns whether a part is one of some connectors, or a rod that ends at one of them.
+pub(super) fn is_among(part: ChainPart, connectors: &Range<usize>) -> bool {
+    connectors.contains(&part.connector()) || connectors.contains(&part.last_connector())
 }
 
 /// A part and a moving obstacle that may get too near to each other in this tick.

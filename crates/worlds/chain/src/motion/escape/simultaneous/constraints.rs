@@ -5,7 +5,9 @@ use super::posture::{PartPoint, TrialPosture, ends};
 use super::solve_input::EscapeSolveInput;
 use sidestep_kernel::math::cos;
 use sidestep_rods::geometry::{Point, angle_between_rad, distance, normalized, sub};
-use sidestep_rods::{BEND_TOLERANCE_RAD, Chain, LENGTH_TOLERANCE_M, RodSweep, TOLERANCE_M};
+use sidestep_rods::{
+    BEND_TOLERANCE_RAD, Chain, LENGTH_TOLERANCE_M, RodSweep, TOLERANCE_M, is_own_path_clear,
+};
 
 /// A bend limit: that of a connector, or its bend before the tick where that was sharper.
 #[derive(Debug, Clone, Copy)]
@@ -58,11 +60,13 @@ pub(super) struct EscapeConstraintChecker<'a, 'b, const D: usize> {
 
 impl<const D: usize> EscapeConstraintChecker<'_, '_, D> {
     pub(super) fn are_met(&self, contacts: &Contacts<D>, bends: &[BendConstraint]) -> bool {
+        let chain = self.input.chain;
         self.are_lengths_met()
             && self.are_travels_met()
             && bends.iter().all(|bend| bend.is_met(self.points))
             && contacts.pairs.iter().all(|pair| {
                 nearest_points(self.points, pair.parts).distance_m >= pair.keep_m - TOLERANCE_M
+                    && is_own_path_clear(chain, [chain.points(), self.points], pair.parts)
             })
             && contacts.walls.iter().all(|wall| {
                 let to = ends(self.points, wall.part);

@@ -1,10 +1,10 @@
 //! All bodies that the parts of a chain may touch in a tick.
 
+use super::super::EscapeMargin;
 use super::super::threat::{Threat, collect_threats};
-use super::super::{ChainPart, EscapeMargin};
 use super::posture::ends;
 use sidestep_rods::geometry::{Aabb, ConvexCore, NearestPoints, Point, between_segments, distance};
-use sidestep_rods::{Chain, Obstacles, RodBvh};
+use sidestep_rods::{Chain, ChainPart, Obstacles, RodBvh, part_pairs};
 
 /// A part near an obstacle that stands still.
 #[derive(Debug, Clone, Copy)]
@@ -64,7 +64,7 @@ impl<const D: usize> Contacts<D> {
         self.pairs.clear();
         for part in parts(chain) {
             let ends = ends(chain.points(), part);
-            let radius_m = radius_m(chain, part);
+            let radius_m = chain.part_radius_m(part);
             obstacles.visit(&Aabb::from_points(&ends).grown(radius_m + reach_m), |o| {
                 let apart_m = o.core.nearest_to_segment(ends).distance_m;
                 let touch_m = radius_m + o.radius_m;
@@ -91,10 +91,8 @@ impl<const D: usize> Contacts<D> {
         for rod in 0..n {
             body.visit(&grown_rod_box(chain, rod, by_m), |other| {
                 if other > rod {
-                    let last = (other + 1 == n).then_some(other + 1);
-                    for parts in candidate_pairs(rod, other, last).into_iter().flatten() {
-                        pairs.extend(near_pair(chain, parts, reach_m));
-                    }
+                    let candidates = part_pairs(rod, other, n);
+                    pairs.extend(candidates.filter_map(|parts| near_pair(chain, parts, reach_m)));
                 }
             });
         }
@@ -117,41 +115,14 @@ fn parts<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = ChainPart> + 
     (0..=n).map(ChainPart::Connector).chain((0..n).map(ChainPart::Rod))
 }
 
-pub(super) fn radius_m<const D: usize>(chain: &Chain<D>, part: ChainPart) -> f64 {
-    match part {
-        ChainPart::Connector(k) => chain.connectors()[k].radius_m,
-        ChainPart::Rod(i) => chain.rods()[i].radius_m,
-    }
-}
-
-/// Returns the pairs that two rods and their connectors make. As in any motion, neighbors are
-/// exempt: connectors one index apart, rods two.
-fn candidate_pairs(rod: usize, other: usize, last: Option<usize>) -> [Option<[ChainPart; 2]>; 6] {
-    [
-        nonadjacent_connectors(rod, other),
-        last.and_then(|last| nonadjacent_connectors(rod, last)),
-        nonadjacent_rod_connector(rod, other),
-        last.and_then(|last| nonadjacent_rod_connector(rod, last)),
-        (rod + 1 < other).then_some([ChainPart::Connector(rod), ChainPart::Rod(other)]),
-        (other > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Rod(other)]),
-    ]
-}
-
-fn nonadjacent_connectors(one: usize, other: usize) -> Option<[ChainPart; 2]> {
-    (other > one + 1).then_some([ChainPart::Connector(one), ChainPart::Connector(other)])
-}
-
-fn nonadjacent_rod_connector(rod: usize, connector: usize) -> Option<[ChainPart; 2]> {
-    (connector > rod + 2).then_some([ChainPart::Rod(rod), ChainPart::Connector(connector)])
-}
-
+/// Returns two parts as a contact if they are within reach of each other, and may not touch.
 fn near_pair<const D: usize>(
     chain: &Chain<D>,
     parts: [ChainPart; 2],
     reach_m: f64,
 ) -> Option<PartPair> {
     let apart_m = nearest_points(chain.points(), parts).distance_m;
-    let touch_m = parts.map(|part| radius_m(chain, part)).iter().sum::<f64>();
+    let touch_m = chain.min_separation_m(parts[0], parts[1])?;
     (apart_m < touch_m + reach_m).then(|| PartPair { parts, keep_m: touch_m.min(apart_m) })
 }
 

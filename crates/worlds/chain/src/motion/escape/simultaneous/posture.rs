@@ -1,6 +1,6 @@
 //! Positions under trial, with the inverse masses by which corrections are shared, as in position-based dynamics.
 
-use super::super::threat::ChainPart;
+use sidestep_rods::ChainPart;
 use sidestep_rods::geometry::{Point, add_scaled};
 
 pub(super) struct TrialPosture<'a, const D: usize> {

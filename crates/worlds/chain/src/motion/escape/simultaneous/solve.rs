@@ -5,17 +5,17 @@
 //! obstacles may be in conflict with laws, and never the other way round.
 
 use super::super::EscapeMargin;
-use super::super::threat::{ChainPart, Threat, gap_m, leftward_direction};
+use super::super::threat::{Threat, gap_m, leftward_direction};
 use super::constraints::{BendConstraint, EscapeConstraintChecker};
-use super::contacts::{Contacts, fraction_along, nearest_points, radius_m};
+use super::contacts::{Contacts, fraction_along, nearest_points};
 use super::lengths::RodLengthProjector;
 use super::posture::{PartPoint, TrialPosture, ends};
 use super::solve_input::{EscapeSolveInput, ExitDirection, SoftConstraints};
-use sidestep_rods::Obstacle;
 use sidestep_rods::geometry::{
     NearestPoints, Point, add_scaled, distance, lerp, normalized, perpendicular, scaled, sub,
     unit_x,
 };
+use sidestep_rods::{ChainPart, Obstacle};
 use std::f64::consts::PI;
 
 /// Finds positions for all connectors. It owns its buffers.
@@ -132,7 +132,8 @@ impl<const D: usize> EscapeSolver<D> {
             let mover = &input.obstacles.moving()[threat.mover];
             let ends = posture.ends(threat.part);
             let nearest = mover.core.nearest_to_segment(ends);
-            let gap_m = nearest.distance_m - mover.radius_m - radius_m(input.chain, threat.part);
+            let gap_m =
+                nearest.distance_m - mover.radius_m - input.chain.part_radius_m(threat.part);
             let through = through.filter(|through| through.obstacle == mover.id);
             let keep_m = match (through, soft) {
                 (None, Some(margin)) => margin.required_gap_m(mover),
@@ -245,7 +246,7 @@ impl<const D: usize> EscapeSolver<D> {
         for threat in &self.contacts.threats {
             let mover = &input.obstacles.moving()[threat.mover];
             let apart_m = mover.core.nearest_to_segment(ends(points, threat.part)).distance_m;
-            let gap_m = apart_m - mover.radius_m - radius_m(input.chain, threat.part);
+            let gap_m = apart_m - mover.radius_m - input.chain.part_radius_m(threat.part);
             if gap_m < least.0 {
                 least = (gap_m, Some(*threat));
             }
