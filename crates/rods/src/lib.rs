@@ -19,6 +19,8 @@ mod obstacle;
 mod open;
 mod own_body;
 mod pass;
+mod posture;
+mod projection;
 mod propagate;
 mod reach;
 mod reaction;

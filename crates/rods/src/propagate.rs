@@ -15,6 +15,7 @@ use super::motion_context::{
 use super::obstacle::{Obstacles, swept_bounds};
 use super::open::{self, StayRule};
 use super::pass::{ChainDirection, MotionEffects};
+use super::projection::{ConstraintProjector, ProjectionFailure};
 use super::reaction::Reaction;
 use super::rod_bvh::RodBvh;
 use super::rules::{ReactionRules, RotationRule};
@@ -50,6 +51,7 @@ pub struct Propagator<const D: usize> {
     /// When to try proofs of sub-steps among obstacles.
     proofs: SeparationProofSchedule,
     scratch: CandidateScratch<D>,
+    projector: ConstraintProjector<D>,
     alternatives: Vec<BacktrackAlternative<D>>,
     /// Positions before the request, of the run of connectors that have moved since: a veto in a
     /// later sub-step takes back the earlier ones.
@@ -166,6 +168,36 @@ impl<const D: usize> Propagator<D> {
             }
         }
         Ok(MotionOutcome::Moved(self.completed_motion(None)))
+    }
+
+    /// Moves all parts of a chain at once by as little as it takes to bring connector `k` to a target, or vetoes. Held
+    /// connectors stay where they may be; whether the rules of single parts would lead there does not matter, but
+    /// everything that they keep is kept.
+    pub fn move_at_once(
+        &mut self,
+        chain: &mut Chain<D>,
+        obstacles: &Obstacles<D>,
+        k: usize,
+        to: Point<D>,
+    ) -> Result<(), Veto<D>> {
+        let before = chain.points().to_vec();
+        let mut points = before.clone();
+        points[k] = to;
+        let projected = self.projector.project(chain, &mut points, k, self.rules.self_collision);
+        if let Err(failure) = projected {
+            let reason = match failure {
+                ProjectionFailure::Lengths => VetoReason::Mobility,
+                ProjectionFailure::OwnBody => VetoReason::SelfCollision,
+            };
+            return Err(Veto { by: k, from: k, reason, obstacle: None, reached: before[k] });
+        }
+        chain.points_mut().copy_from_slice(&points);
+        let veto = self.find_motion_veto(chain, obstacles, &before, k);
+        if let Some(veto) = veto {
+            chain.points_mut().copy_from_slice(&before);
+            return Err(veto);
+        }
+        Ok(())
     }
 
     /// Returns as many sub-steps as the connector needs that goes farthest.

@@ -1,11 +1,12 @@
-//! One motion of a chain: by propagation, or by a reach if a held connector vetoes it.
+//! One motion of a chain: by propagation or, where a connector is held, of all parts at once.
 
 use sidestep_arms::ik::{ChainIkGoal, IkEngine, IkSolver};
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
     Chain, CompletedMotion, Connector, Mobility, MotionOutcome, MotionRequest, Obstacles,
-    Propagator, ReachOutcome, ReachRequest, RequestedMotion, Veto, VetoReason, reach_target,
+    Propagator, ReachOutcome, ReachRequest, RequestedMotion, Veto, VetoReason, is_in_range,
+    reach_target,
 };
 
 /// What moves a chain, and what it may meet.
@@ -14,8 +15,8 @@ struct MotionEnvironment<'a, const D: usize> {
     obstacles: &'a Obstacles<D>,
 }
 
-/// Moves a chain as requested; if a connector vetoes that must stay at its position, on its line or plane,
-/// or in its box, by [`reach_target`].
+/// Moves a chain as requested. A chain with a connector that must stay at its position, on its line or plane, or in its box
+/// moves all parts at once, by as little as it takes; where that is blocked, by propagation and by [`reach_target`].
 ///
 /// # Errors
 /// As [`Propagator::propagate`].
@@ -25,91 +26,95 @@ pub(crate) fn execute_request<const D: usize>(
     obstacles: &Obstacles<D>,
     request: &MotionRequest<D>,
 ) -> Result<MotionOutcome<D>, InputError> {
-    if let RequestedMotion::Connector { k, to } = request.motion
-        && let Some(base) = first_constrained_connector(chain, k)
-    {
-        let order = ReachRequest { k, target: to, base, tolerance_m: TOLERANCE_M };
-        let scene = &mut MotionEnvironment { propagator, obstacles };
-        return move_with_sliding_connector(scene, chain, &order, request);
-    }
-    let outcome = propagator.propagate(chain, obstacles, request)?;
-    let (MotionOutcome::Vetoed(veto), RequestedMotion::Connector { k, to }) =
-        (&outcome, request.motion)
-    else {
-        return Ok(outcome);
+    let RequestedMotion::Connector { k, to } = request.motion else {
+        return propagator.propagate(chain, obstacles, request);
     };
+    let Some(hold) = Hold::of_chain(chain) else {
+        return propagator.propagate(chain, obstacles, request);
+    };
+    let order = ReachRequest { k, target: to, base: hold.connector, tolerance_m: TOLERANCE_M };
+    let scene = &mut MotionEnvironment { propagator, obstacles };
+    let joints_m =
+        if hold.has_joints { scene.propagator.rules.joint_step_max_m } else { f64::INFINITY };
+    try_slowed(chain, k, to, joints_m, |chain, before, target| {
+        let order = ReachRequest { target, ..order };
+        move_held_chain(scene, chain, before, &order, request)
+    })
+}
+
+/// How a chain is held.
+#[derive(Debug, Clone, Copy)]
+struct Hold {
+    /// The first connector that is not free to go anywhere.
+    connector: usize,
+    /// Whether the chain hangs on a connector that is fixed, or on a line, a plane or in a box, so that its joints have a
+    /// speed limit; parts that hang on a failed connector swing freely.
+    has_joints: bool,
+}
+
+impl Hold {
+    fn of_chain<const D: usize>(chain: &Chain<D>) -> Option<Self> {
+        // Most chains are held nowhere, and would be searched for each motion.
+        if chain.is_plain() {
+            return None;
+        }
+        let connectors = chain.connectors();
+        let is_bound = |connector: &Connector<D>| connector.mobility != Mobility::Free;
+        let connector = connectors.iter().position(|c| c.failed || is_bound(c))?;
+        let has_joints = connectors.iter().any(|c| !c.failed && is_bound(c));
+        Some(Self { connector, has_joints })
+    }
+}
+
+/// Moves a held chain: all of it at once, or by propagation and return passes where something is in the way of that. Also
+/// returns the longest displacement of a connector with which the outcome still counts as a motion, meters.
+fn move_held_chain<const D: usize>(
+    scene: &mut MotionEnvironment<'_, D>,
+    chain: &mut Chain<D>,
+    before: &[Point<D>],
+    order: &ReachRequest<D>,
+    request: &MotionRequest<D>,
+) -> Result<(MotionOutcome<D>, f64), InputError> {
+    let ReachRequest { k, target, .. } = *order;
+    let longest_m = chain.rods().iter().map(|rod| rod.max_m).fold(0.0, f64::max);
+    let jump_m = scene.propagator.rules.slave_step_max_m.min(MAX_JUMP * longest_m);
+    let initiator = chain.connectors()[k];
+    let may_lead = !initiator.is_still() && initiator.mobility.allows(target, before[k]);
+    if may_lead && is_in_range(&target) {
+        let Err(veto) = scene.propagator.move_at_once(chain, scene.obstacles, k, target) else {
+            return Ok((MotionOutcome::Moved(motion_since(before, chain, k)), jump_m));
+        };
+        // Rods that turn one by one find ways past obstacles. Out of the chain's own way all parts at once move as well,
+        // and far more cheaply.
+        if veto.reason == VetoReason::SelfCollision {
+            return Ok((MotionOutcome::Vetoed(veto), f64::INFINITY));
+        }
+        if veto.obstacle.is_none()
+            && let Some(by) = reach_limiting_connector(chain, order)
+        {
+            let veto = Veto { by, reason: VetoReason::OutOfReach, ..veto };
+            return Ok((MotionOutcome::Vetoed(veto), f64::INFINITY));
+        }
+    }
+    let motion = RequestedMotion::Connector { k, to: target };
+    let request = MotionRequest { motion, ..*request };
+    let outcome = scene.propagator.propagate(chain, scene.obstacles, &request)?;
+    let MotionOutcome::Vetoed(veto) = &outcome else { return Ok((outcome, f64::INFINITY)) };
     // A reach leads others back; it is of no use to an initiator that is held itself.
     if !is_held_veto(veto.reason) || veto.by == k {
-        return Ok(outcome);
+        return Ok((outcome, f64::INFINITY));
     }
-    let order = ReachRequest { k, target: to, base: veto.by, tolerance_m: TOLERANCE_M };
-    move_with_fixed_base(&mut MotionEnvironment { propagator, obstacles }, chain, &order, veto)
+    let order = ReachRequest { base: veto.by, ..*order };
+    if let Some(by) = reach_limiting_connector(chain, &order) {
+        let veto = Veto { by, reason: VetoReason::OutOfReach, ..*veto };
+        return Ok((MotionOutcome::Vetoed(veto), f64::INFINITY));
+    }
+    move_to_target(scene, chain, before, &order, veto)
 }
 
 /// Returns whether a return pass may answer a veto.
 fn is_held_veto(reason: VetoReason) -> bool {
     matches!(reason, VetoReason::Fixed | VetoReason::Failed | VetoReason::Mobility)
-}
-
-/// Returns the first connector, other than the one that moves, that belongs on a line, on a plane or in a
-/// box.
-fn first_constrained_connector<const D: usize>(chain: &Chain<D>, k: usize) -> Option<usize> {
-    // Most chains have none, and would be searched for each motion.
-    if chain.is_plain() {
-        return None;
-    }
-    chain.connectors().iter().enumerate().position(|(i, connector)| {
-        let slides = !matches!(connector.mobility, Mobility::Free | Mobility::Fixed);
-        i != k && !connector.failed && slides
-    })
-}
-
-/// Moves a chain one of whose connectors slides. Where that one could follow only by moving much farther than the
-/// initiator, as the foot of a rod that stands across its line, or from one side of its master to the other, return
-/// passes find a position nearby.
-fn move_with_sliding_connector<const D: usize>(
-    scene: &mut MotionEnvironment<'_, D>,
-    chain: &mut Chain<D>,
-    order: &ReachRequest<D>,
-    request: &MotionRequest<D>,
-) -> Result<MotionOutcome<D>, InputError> {
-    let k = order.k;
-    let joints_m = scene.propagator.rules.joint_step_max_m;
-    try_slowed(chain, k, order.target, joints_m, |chain, before, to| {
-        let request = MotionRequest { motion: RequestedMotion::Connector { k, to }, ..*request };
-        let veto = match scene.propagator.propagate(chain, scene.obstacles, &request)? {
-            MotionOutcome::Vetoed(veto) if is_held_veto(veto.reason) && veto.by != k => veto,
-            MotionOutcome::Moved(_) if max_displacement(before, chain.points()).1 > joints_m => {
-                // It would jump, as if it had objected.
-                chain.points_mut().copy_from_slice(before);
-                let reason = VetoReason::Mobility;
-                Veto { by: order.base, from: k, reason, obstacle: None, reached: before[k] }
-            }
-            outcome => return Ok((outcome, f64::INFINITY)),
-        };
-        let order = ReachRequest { target: to, base: veto.by, ..*order };
-        move_to_target(scene, chain, before, &order, &veto)
-    })
-}
-
-/// Moves a chain whose base has vetoed, as far as the speed limit of its joints allows.
-fn move_with_fixed_base<const D: usize>(
-    scene: &mut MotionEnvironment<'_, D>,
-    chain: &mut Chain<D>,
-    order: &ReachRequest<D>,
-    objection: &Veto<D>,
-) -> Result<MotionOutcome<D>, InputError> {
-    // Only a fixed connector is the base of an arm, whose joints have a speed limit; the parts that hang on a failed
-    // connector swing freely.
-    let joints_m = if objection.reason == VetoReason::Fixed {
-        scene.propagator.rules.joint_step_max_m
-    } else {
-        f64::INFINITY
-    };
-    try_slowed(chain, order.k, order.target, joints_m, |chain, before, target| {
-        let order = ReachRequest { target, ..*order };
-        move_to_target(scene, chain, before, &order, objection)
-    })
 }
 
 /// Tries a motion, shortened until no connector moves farther than `joints_m`: near a singular posture
@@ -217,9 +222,6 @@ fn move_by_ik<const D: usize>(
     objection: Veto<D>,
 ) -> Result<MotionOutcome<D>, InputError> {
     let ReachRequest { k, target, base, tolerance_m } = *order;
-    if let Some(by) = reach_limiting_connector(chain, order) {
-        return Ok(MotionOutcome::Vetoed(Veto { by, reason: VetoReason::OutOfReach, ..objection }));
-    }
     let goal = ChainIkGoal {
         engine: IkEngine::Dls,
         restarts: 0,
