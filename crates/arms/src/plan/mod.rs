@@ -1,8 +1,9 @@
-//! Motion planning for chains with a fixed base: a path among obstacles from the present posture to one
-//! that reaches a target, where no local rule finds one.
+//! Motion planning for chains that are free or held at one connector: a path among obstacles, and out of the chain's own
+//! way, from the present posture to one that reaches a target, where no local rule finds one.
 //!
 //! ```text
 //! space.rs:  postures of rods, the straight path between two, and whether it is free
+//! arc.rs:    straight postures and arcs, through which most paths lead
 //! joints.rs: the same for the joints of an arm
 //! tree.rs:   two trees of postures that grow toward each other (RRT-Connect), and shortcuts
 //! ```
@@ -10,13 +11,14 @@
 //! Source: Kuffner and LaValle, "RRT-Connect: an efficient approach to single-query path planning",
 //! ICRA 2000. A path of rods keeps rods, bend limits and mobilities; one of joints keeps their limits as well.
 
+mod arc;
 mod joints;
 mod space;
 #[cfg(test)]
 mod tests;
 mod tree;
 
-use super::ik::{ChainIkGoal, IkSolver};
+use super::ik::{ChainIkGoal, IkEngine, IkSolver};
 pub use joints::{JointPosture, JointSpace};
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
@@ -82,7 +84,7 @@ pub trait ConfigurationSpace {
 /// straight path is free; none if the search found none.
 ///
 /// # Errors
-/// As [`IkSolver::solve`]; also when no connector of the chain keeps its place.
+/// As [`IkSolver::solve`]; also when several connectors of the chain are held.
 pub fn plan<const D: usize>(
     chain: &Chain<D>,
     obstacles: &Obstacles<D>,
@@ -92,7 +94,9 @@ pub fn plan<const D: usize>(
 ) -> Result<Option<Vec<ChainPosture<D>>>, InputError> {
     let space = ChainConfigurationSpace::new(chain, obstacles, rules.self_collision, query.k)?;
     let goals = goals(&space, rules, query, draws)?;
-    Ok(find_path(&space, goals, draws))
+    let mut vias = space.uncurling_postures(query);
+    vias.retain(|posture| space.is_free(posture));
+    Ok(find_path(&space, vias, goals, draws))
 }
 
 /// Plans a path of an arm to a target, as [`plan`] does: the joint values after the present ones.
@@ -105,45 +109,57 @@ pub fn plan_joints<const D: usize>(
     draws: &mut Draws,
 ) -> Result<Option<Vec<Vec<f64>>>, InputError> {
     let goals = space.goals(query, draws)?;
-    Ok(find_path(space, goals, draws))
+    Ok(find_path(space, Vec::new(), goals, draws))
 }
 
+/// Returns a path to one of the goals, perhaps through one of the postures on the way that are worth a try.
 fn find_path<S: ConfigurationSpace>(
     space: &S,
+    vias: Vec<S::Posture>,
     goals: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Option<Vec<S::Posture>> {
     if goals.is_empty() {
         return None;
     }
-    let path = tree::find_path(space, goals, draws)?;
+    let path = tree::find_path(space, vias, goals, draws)?;
     Some(tree::shorten_path(space, path, draws))
 }
 
-/// Returns valid postures that reach the target: the first sought from the present posture, the others
-/// from any, because those near the present one may be cut off from it by the chain's own body.
+/// Returns valid postures that reach the target: arcs, and others that are sought, the first from the present posture and
+/// the rest from any, because those near the present one may be cut off from it by the chain's own body.
 fn goals<const D: usize>(
     space: &ChainConfigurationSpace<'_, D>,
     rules: ReactionRules,
     query: &PlanningQuery<D>,
     draws: &mut Draws,
 ) -> Result<Vec<ChainPosture<D>>, InputError> {
+    let mut goals = space.arc_postures(query);
+    goals.retain(|posture| space.is_free(posture));
+    goals.truncate(MAX_GOALS);
+    // A root that may move finds a place from which an arc leads to the target.
+    if !space.is_root_still() && !goals.is_empty() {
+        return Ok(goals);
+    }
     let mut solver = IkSolver::new(rules);
     let mut from = space.chain().clone();
-    let mut goals: Vec<ChainPosture<D>> = Vec::new();
+    let most = goals.len() + MAX_GOALS;
+    let known = goals.len();
     for search in 1..=MAX_SEARCHES {
         let goal = ChainIkGoal {
+            // Postures alone: a motion there would be a path, and local rules have found none.
+            engine: IkEngine::Dls,
             tolerance_m: query.tolerance_m,
             restarts: MAX_RESTARTS,
             seed: draws.next_u64(),
-            ..ChainIkGoal::new(query.k, space.base_connector(), query.target)
+            ..ChainIkGoal::new(query.k, space.root(), query.target)
         };
         let result = solver.solve(&from, space.obstacles(), &goal)?;
         if result.reached && space.is_free(&result.points) && !goals.contains(&result.points) {
             goals.push(result.points);
         }
         // Where the first searches find nothing, further ones hardly would.
-        if goals.len() == MAX_GOALS || goals.is_empty() && search == MAX_GOALS {
+        if goals.len() == most || goals.len() == known && search == MAX_GOALS {
             break;
         }
         from.points_mut().copy_from_slice(&space.sample(draws));

@@ -1,4 +1,4 @@
-//! Postures of a chain with a fixed base, and the straight path between two.
+//! Postures of a chain, and the straight path between two.
 
 use super::{ChainPosture, ConfigurationSpace};
 use crate::ik::constraints::ConstraintChecker;
@@ -8,14 +8,16 @@ use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::{
     Point, add, add_scaled, distance, lerp, norm, norm_squared, normalized, scaled, sub, unit_x,
 };
-use sidestep_rods::{Chain, Obstacles};
+use sidestep_rods::{Chain, Connector, Mobility, Obstacles};
 use std::f64::consts::PI;
 
-/// The postures of one chain among obstacles.
+/// The postures of one chain among obstacles. A posture is the place of one connector, the root, and the directions and
+/// lengths of all rods from there outward. The root is the connector that is held, or an end of a free chain.
 pub struct ChainConfigurationSpace<'a, const D: usize> {
     checker: ConstraintChecker<'a, D>,
-    /// The connectors from the one that keeps its place outward, to the end of the chain.
-    limb: Vec<usize>,
+    /// The connectors from the root outward, to one end of the chain or to both.
+    limbs: Vec<Vec<usize>>,
+    root: usize,
     k: usize,
     /// Longest move of a connector between two postures that are checked, meters.
     step_m: f64,
@@ -25,7 +27,7 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
     /// Returns the postures to which connector `k` can bring a chain.
     ///
     /// # Errors
-    /// When no other connector keeps its place.
+    /// When the chain is held at several connectors that would all have to move or to stay.
     pub fn new(
         chain: &'a Chain<D>,
         obstacles: &'a Obstacles<D>,
@@ -34,18 +36,35 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
     ) -> Result<Self, InputError> {
         let n = chain.points().len();
         let connectors = chain.connectors();
-        let below = (0..k).rev().find(|&i| connectors[i].is_still());
-        let above = (k + 1..n).find(|&i| connectors[i].is_still());
-        let limb = match (below, above) {
-            (Some(base), _) => (base..n).collect(),
-            (None, Some(base)) => (0..=base).rev().collect(),
+        let is_held = |c: &Connector<D>| c.failed || c.mobility != Mobility::Free;
+        let below = (0..k).rev().find(|&i| is_held(&connectors[i]));
+        let above = (k + 1..n).find(|&i| is_held(&connectors[i]));
+        let root = match (below, above) {
+            (Some(root), None) | (None, Some(root)) => root,
+            // The end that is farther away swings about the nearer part.
             (None, None) => {
-                let remedy = "give a connector mobility = \"fixed\"";
-                return Err(InputError::new("planner", "the chain has no fixed base", remedy));
+                if 2 * k < n {
+                    n - 1
+                } else {
+                    0
+                }
             }
+            (Some(low), Some(high)) => return Err(held_twice_error(low, high)),
         };
+        let up: Vec<usize> = (root..n).collect();
+        let down: Vec<usize> = (0..=root).rev().collect();
+        let limbs = match (connectors[root].is_still(), root < k) {
+            // What lies behind a base stays where it is.
+            (true, true) => vec![up],
+            (true, false) => vec![down],
+            (false, _) => vec![up, down],
+        };
+        let moves = |i: &&usize| **i != root && is_held(&connectors[**i]) && **i != k;
+        if let Some(other) = limbs.iter().flatten().find(moves) {
+            return Err(held_twice_error(root, *other));
+        }
         let checker = ConstraintChecker { chain, obstacles, self_collision };
-        Ok(Self { checker, limb, k, step_m: chain.step_m() })
+        Ok(Self { checker, limbs, root, k, step_m: chain.step_m() })
     }
 
     pub(super) fn chain(&self) -> &'a Chain<D> {
@@ -56,9 +75,67 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
         self.checker.obstacles
     }
 
-    pub(super) fn base_connector(&self) -> usize {
-        self.limb[0]
+    pub(super) fn root(&self) -> usize {
+        self.root
     }
+
+    pub(super) fn is_root_still(&self) -> bool {
+        self.chain().connectors()[self.root].is_still()
+    }
+
+    pub(super) fn initiator(&self) -> usize {
+        self.k
+    }
+
+    pub(super) fn limbs(&self) -> impl Iterator<Item = &[usize]> {
+        self.limbs.iter().map(Vec::as_slice)
+    }
+
+    /// Returns the mean length of the rod between two neighbors, meters.
+    pub(super) fn mean_length_m(&self, i: usize, j: usize) -> f64 {
+        let rod = self.chain().rod_between(i, j);
+        0.5 * (rod.min_m + rod.max_m)
+    }
+
+    /// Returns the mean lengths of the rods from the root to the initiator, meters.
+    pub(super) fn rods_to_initiator(&self) -> Vec<f64> {
+        let steps = self.root.abs_diff(self.k);
+        let limb = self.limbs.iter().find(|limb| limb.contains(&self.k));
+        let pairs = limb.into_iter().flat_map(|limb| limb.windows(2)).take(steps);
+        pairs.map(|pair| self.mean_length_m(pair[0], pair[1])).collect()
+    }
+
+    /// Returns the reach of the rods from the root to connector `k`, meters.
+    pub(super) fn length_between(&self, k: usize) -> f64 {
+        let rods = &self.chain().rods()[self.root.min(k)..self.root.max(k)];
+        rods.iter().map(|rod| rod.max_m).sum()
+    }
+
+    /// Returns the present posture with the root elsewhere, where it may be.
+    pub(super) fn moved_root(&self, root_at: Point<D>) -> ChainPosture<D> {
+        let mut posture = self.present_posture();
+        if !self.is_root_still() {
+            posture[self.root] = root_at;
+        }
+        posture
+    }
+
+    /// Returns a random place of the root: within reach of the present one, where its mobility allows it.
+    fn sample_root(&self, draws: &mut Draws) -> Point<D> {
+        let present = self.chain().points()[self.root];
+        if self.is_root_still() {
+            return present;
+        }
+        let reach_m = self.length_m();
+        let drawn = present.map(|x| x + reach_m * (2.0 * draws.uniform() - 1.0));
+        self.chain().connectors()[self.root].mobility.project(drawn, present)
+    }
+}
+
+fn held_twice_error(one: usize, other: usize) -> InputError {
+    let [low, high] = [one.min(other), one.max(other)];
+    let cause = format!("the chain is held at connectors {low} and {high}");
+    InputError::new("planner", cause, "hold one connector at most, or set planner = \"none\"")
 }
 
 impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
@@ -69,16 +146,16 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
     }
 
     fn length_m(&self) -> f64 {
-        let rods = self.limb.windows(2);
-        rods.map(|pair| self.checker.chain.rod_between(pair[0], pair[1]).max_m).sum()
+        let rods = self.limbs().flat_map(|limb| limb.windows(2));
+        rods.map(|pair| self.chain().rod_between(pair[0], pair[1]).max_m).sum()
     }
 
     fn distance_m(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
-        self.limb.iter().map(|&i| distance(a[i], b[i])).fold(0.0, f64::max)
+        a.iter().zip(b).map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max)
     }
 
     fn squared_distance(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
-        self.limb.iter().map(|&i| norm_squared(sub(a[i], b[i]))).sum()
+        a.iter().zip(b).map(|(a, b)| norm_squared(sub(*a, *b))).sum()
     }
 
     fn interpolate(
@@ -91,7 +168,10 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
             return b.clone();
         }
         let mut posture = a.clone();
-        for pair in self.limb.windows(2) {
+        if !self.is_root_still() {
+            posture[self.root] = lerp(a[self.root], b[self.root], fraction);
+        }
+        for pair in self.limbs().flat_map(|limb| limb.windows(2)) {
             let [inner, outer] = [pair[0], pair[1]];
             let [from, to] = [a, b].map(|points| sub(points[outer], points[inner]));
             let [from_m, to_m] = [norm(from), norm(to)];
@@ -121,11 +201,14 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
     }
 
     fn sample(&self, draws: &mut Draws) -> ChainPosture<D> {
-        let mut posture = self.present_posture();
+        let mut posture = self.moved_root(self.sample_root(draws));
         let stiffness = STIFFNESS[draws.uniform_below(STIFFNESS.len() as u32) as usize];
         let mut u: Point<D> = direction(draws);
-        for pair in self.limb.windows(2) {
+        for pair in self.limbs().flat_map(|limb| limb.windows(2)) {
             let [inner, outer] = [pair[0], pair[1]];
+            if inner == self.root {
+                u = direction(draws);
+            }
             let rod = self.checker.chain.rod_between(inner, outer);
             let length_m = rod.min_m + draws.uniform() * (rod.max_m - rod.min_m);
             posture[outer] = add_scaled(posture[inner], u, length_m);

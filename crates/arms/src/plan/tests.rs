@@ -100,12 +100,65 @@ fn no_way_leads_into_an_obstacle_or_out_of_reach() {
 }
 
 #[test]
-fn a_chain_without_a_base_has_no_plan() {
-    let rod = Rod::with_fixed_length(0.4, 0.02);
-    let chain = Chain::straight([0.0; 2], [1.0, 0.0], 5, rod, Connector::free(0.03)).unwrap();
+fn a_chain_that_is_held_twice_has_no_plan() {
+    let mut chain = arm();
+    chain.set_mobility(5, Mobility::Fixed).unwrap();
+    let between = PlanningQuery { k: 3, ..BEHIND };
     let error =
-        plan(&chain, &wall(), ReactionRules::default(), &BEHIND, &mut draws(1)).unwrap_err();
+        plan(&chain, &wall(), ReactionRules::default(), &between, &mut draws(1)).unwrap_err();
     assert_eq!(error.place(), "planner");
+    assert!(error.to_string().contains("connectors 0 and 5"), "{error}");
+}
+
+/// A spiral of twelve rods, in which the tool lies innermost: it gets out by uncurling alone.
+#[test]
+fn a_coiled_chain_uncurls_whatever_holds_it() {
+    let rod = Rod::with_fixed_length(0.3, 0.01);
+    let mut points = vec![[0.0, 0.0]];
+    let mut direction_rad: f64 = 0.0;
+    for i in 0..12 {
+        let u =
+            [sidestep_kernel::math::cos(direction_rad), sidestep_kernel::math::sin(direction_rad)];
+        let [x, y] = points[i];
+        points.push([x + 0.3 * u[0], y + 0.3 * u[1]]);
+        direction_rad += 0.35 + 0.07 * i as f64;
+    }
+    let coil = Chain::new(points, vec![Connector::free(0.02); 13], vec![rod; 12]).unwrap();
+    let rules = ReactionRules { self_collision: true, ..ReactionRules::default() };
+    let query = PlanningQuery { k: 12, target: [1.0, -1.5], tolerance_m: 1e-3 };
+    for base in [
+        Mobility::Free,
+        Mobility::Fixed,
+        Mobility::OnSegment([[-3.0, 0.0], [3.0, 0.0]]),
+        Mobility::OnPlane { normal: [0.0, 1.0], offset_m: 0.0 },
+        Mobility::InBox { lo: [-1.0, -0.5], hi: [1.0, 0.0] },
+    ] {
+        let mut chain = coil.clone();
+        chain.set_mobility(0, base).unwrap();
+        let obstacles = Obstacles::default();
+        let path = plan(&chain, &obstacles, rules, &query, &mut draws(1)).unwrap();
+        let path = path.unwrap_or_else(|| panic!("{base:?}: no path"));
+        let space = ChainConfigurationSpace::new(&chain, &obstacles, true, 12).unwrap();
+        let mut from = space.present_posture();
+        for next in &path {
+            for part in 1..=200 {
+                let at = space.interpolate(&from, next, f64::from(part) / 200.0);
+                assert!(base.allows(at[0], chain.points()[0]), "{base:?}");
+                for i in 0..12 {
+                    for j in i + 2..12 {
+                        let crosses = sidestep_rods::geometry::segments_cross(
+                            [at[i], at[i + 1]],
+                            [at[j], at[j + 1]],
+                        );
+                        assert!(!crosses, "{base:?}: rods {i} and {j}");
+                    }
+                }
+            }
+            from.clone_from(next);
+        }
+        let left_m = sidestep_rods::geometry::distance(from[12], query.target);
+        assert!(left_m <= query.tolerance_m, "{base:?}: {left_m}");
+    }
 }
 
 #[test]

@@ -71,9 +71,11 @@ impl<S: ConfigurationSpace> PostureTree<S> {
     }
 }
 
-/// Returns postures from the present one to one of the goals, both included.
+/// Returns postures from the present one to one of the goals, both included. The way straight to a goal is tried first, then
+/// the ways through `vias`.
 pub(super) fn find_path<S: ConfigurationSpace>(
     space: &S,
+    vias: Vec<S::Posture>,
     goals: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Option<Vec<S::Posture>> {
@@ -81,11 +83,11 @@ pub(super) fn find_path<S: ConfigurationSpace>(
     let stride_m = MAX_STRIDE * space.length_m();
     let max_strides = (MAX_SEGMENT / MAX_STRIDE).ceil() as usize;
     let mut trees = [PostureTree::new(vec![present.clone()]), PostureTree::new(goals.clone())];
-    let towards_goals = goals.into_iter().map(|goal| (goal, max_strides));
+    let towards_goals = goals.into_iter().chain(vias).map(|to| (to, max_strides));
     let drawn = std::iter::repeat_with(|| None).take(MAX_SAMPLES);
     for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
         interrupt::check();
-        // The trees take turns; the first tries are straight to the goals.
+        // The trees take turns; the first tries are straight to the goals and the postures on the way.
         let (one, other) = if toward.is_some() { (0, 1) } else { (i % 2, 1 - i % 2) };
         let (to, strides) = toward.unwrap_or_else(|| (space.sample(draws), 1));
         let Some((tip, _)) = trees[one].grow_toward(space, &to, stride_m, strides) else {

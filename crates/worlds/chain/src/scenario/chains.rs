@@ -89,7 +89,7 @@ pub(super) struct ChainSection<const D: usize> {
     pub(super) anywhere: bool,
     within_m: Option<Spanned<BoxSection<D>>>,
     pub(super) arm: Option<Spanned<ArmSection>>,
-    robots: Option<Spanned<RobotsSection>>,
+    pub(super) robots: Option<Spanned<RobotsSection>>,
     rod_m: Option<NumberRange>,
     radius_m: Option<f64>,
     rod_radius_m: Option<f64>,
@@ -240,7 +240,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         start: &Chain<D>,
     ) -> Result<Vec<Task<D>>, InputError> {
         let s = section.get_ref();
-        let tasks = s.tasks.0.iter().map(|task| self.task(task, start));
+        let tasks = s.tasks.0.iter().map(|task| self.task(task, s, start));
         let tasks = tasks.collect::<Result<Vec<_>, _>>()?;
         for (section, task) in s.tasks.0.iter().zip(&tasks) {
             self.check_leader(s, section, task, start)?;

@@ -88,6 +88,12 @@ pub(super) struct ObstacleSection<const D: usize> {
     speed_m_s: Option<PositiveNumber>,
 }
 
+impl<const D: usize> ObstacleSection<D> {
+    fn moves(&self) -> bool {
+        self.velocity_m_s.is_some() || self.patrol_m.is_some()
+    }
+}
+
 /// Obstacles at random.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -134,6 +140,13 @@ impl<const D: usize> ObstacleBuilder<D> {
 }
 
 impl<const D: usize> ChainScenarioCompiler<'_, D> {
+    /// Returns whether any obstacle moves.
+    pub(super) fn has_movers(&self) -> bool {
+        let moves = |section: &Spanned<ObstacleSection<D>>| section.get_ref().moves();
+        let are_moving = |section: &Spanned<FieldSection<D>>| section.get_ref().n.is_some();
+        self.file.obstacles.0.iter().any(moves) || self.file.fields.0.iter().any(are_moving)
+    }
+
     /// Returns the ground of a world; random obstacles come last, because they keep away from
     /// chains.
     pub(super) fn compile_ground(
@@ -324,7 +337,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         at: Range<usize>,
         all: &mut ObstacleBuilder<D>,
     ) -> Result<(), InputError> {
-        let moves = s.velocity_m_s.is_some() || s.patrol_m.is_some();
+        let moves = s.moves();
         if D != 2 || corners.len() < 3 || moves || s.at_m.is_some() || s.ends_m.is_some() {
             let remedy = "give three corners or more, in two dimensions, and nothing that moves";
             let at = self.source.key_span(at, &["corners_m"]);

@@ -1,14 +1,16 @@
 //! Tasks of initiators.
 
+use super::super::deploy::deployment::Deployment;
 use super::super::driver::own_driver::OwnDriver;
 use super::super::driver::{MAX_MOTIONS, Targets, Task, TaskKind, Wander};
 use super::super::script::{Script, ScriptMotion, Turtle};
+use super::chains::ChainSection;
 use super::navigators::NavigatorSection;
 use super::{BoxSection, ChainScenarioCompiler, MAX_VALUE, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_kernel::InputError;
-use sidestep_rods::{Chain, Mobility};
+use sidestep_rods::{Chain, Connector, Mobility};
 use sidestep_scenario::{ByName, Spanned};
 use std::ops::Range;
 use std::sync::Arc;
@@ -26,6 +28,9 @@ const DEFAULT_TURN_DEG: f64 = 30.0;
 /// Time without coming nearer to a target after which a path is planned, unless it is given, s: long enough for the
 /// recovery after a veto to be tried first, which costs far less than a plan.
 const DEFAULT_PLAN_DELAY_S: f64 = 0.5;
+
+/// Rods up to which a chain without a fixed base plans by default: the effort grows with the square of their number.
+const MAX_PLANNED_RODS: usize = 64;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -104,12 +109,12 @@ impl<const D: usize> TaskSection<D> {
         self.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from)
     }
 
-    /// Returns whether it plans paths, on a chain with or without a fixed base: an arm soon meets obstacles that local
-    /// rules cannot pass.
-    fn has_planner(&self, has_base: bool) -> bool {
+    /// Returns whether it plans paths; by default where `plans_usually`, because a chain soon meets itself, or obstacles, in
+    /// ways that local rules do not solve.
+    fn has_planner(&self, plans_usually: bool) -> bool {
         match self.planner {
             Some(planner) => planner == PlannerWord::RrtConnect,
-            None => has_base && self.built_in_kind() == Some(TaskKindWord::Targets),
+            None => plans_usually && self.built_in_kind() == Some(TaskKindWord::Targets),
         }
     }
 
@@ -122,12 +127,16 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     pub(super) fn task(
         &self,
         section: &Spanned<TaskSection<D>>,
+        section_of_chain: &ChainSection<D>,
         chain: &Chain<D>,
     ) -> Result<Task<D>, InputError> {
         let s = section.get_ref();
         let at = section.span();
         let n = chain.points().len();
-        let plans = s.has_planner(chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed));
+        let plans = s.has_planner(self.plans_usually(section_of_chain, chain));
+        if plans {
+            self.check_planner(section, chain)?;
+        }
         if s.connector >= n {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
             let remedy = format!("count from 0: the last connector is {}", n - 1);
@@ -155,6 +164,35 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             plans_after_s: plans.then(|| s.plans_after_s.map_or(DEFAULT_PLAN_DELAY_S, f64::from)),
             driver,
         })
+    }
+
+    /// Returns whether tasks of a chain plan paths unless they say otherwise: with a fixed base always, and otherwise where
+    /// plans are cheap and stay right, because the chain is short, held at one connector at most, moved as a whole, and
+    /// nothing moves around it.
+    fn plans_usually(&self, section: &ChainSection<D>, chain: &Chain<D>) -> bool {
+        let held = chain.connectors().iter().filter(|c| c.mobility != Mobility::Free).count();
+        let has_base = chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed);
+        let is_alone = self.file.chain.deployment == Deployment::Direct
+            && section.robots.is_none()
+            && !self.has_movers();
+        held <= 1 && (has_base || is_alone && chain.rods().len() <= MAX_PLANNED_RODS)
+    }
+
+    /// Refuses a planner for a chain whose postures it does not know.
+    fn check_planner(
+        &self,
+        section: &Spanned<TaskSection<D>>,
+        chain: &Chain<D>,
+    ) -> Result<(), InputError> {
+        let mut held = chain.connectors().iter().enumerate();
+        let is_held = |(_, c): &(usize, &Connector<D>)| c.mobility != Mobility::Free;
+        let (Some((low, _)), Some((high, _))) = (held.find(is_held), held.find(is_held)) else {
+            return Ok(());
+        };
+        let cause = format!("a planner for a chain that is held at connectors {low} and {high}");
+        let remedy = "leave it out, or hold the chain at one connector at most";
+        let at = self.source.key_span(section.span(), &["planner"]);
+        Err(self.source.error(at, cause, remedy))
     }
 
     fn driver(
