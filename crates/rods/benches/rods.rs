@@ -132,6 +132,48 @@ fn own() {
     }
 }
 
+/// Straight chains of long and of short rods, whose parts are near each other at all times; and the exponent with which
+/// their time grows.
+fn straight() {
+    for rod_m in [0.05, 0.1] {
+        let mut times_us = [0.0; 2];
+        for (k, (n, motions)) in [(10_000, 100), (100_000, 10)].into_iter().enumerate() {
+            let [without_us, with_us] = [false, true]
+                .map(|self_collision| pull_straight(n, rod_m, motions, self_collision));
+            times_us[k] = with_us;
+            println!(
+                "own body, {n} connectors in a line, rods of {rod_m} m: {with_us:.1} us per motion, {:.2} times as without (bar: 3)",
+                with_us / without_us,
+            );
+        }
+        let exponent = (times_us[1] / times_us[0]).log10();
+        println!("own body, rods of {rod_m} m: time grows with exponent {exponent:.3} (bar: 1.05)");
+    }
+}
+
+/// Microseconds per motion of a straight chain whose head is led along a wave.
+fn pull_straight(n: usize, rod_m: f64, motions: usize, self_collision: bool) -> f64 {
+    let rod = Rod::with_fixed_length(rod_m, 0.008);
+    let back = scaled(unit_x(), -1.0);
+    let mut chain =
+        Chain::straight([0.0; 3], back, n - 1, rod, Connector::free(0.02)).expect("right");
+    let mut propagator = Propagator::default();
+    propagator.rules.self_collision = self_collision;
+    let mut k = 0;
+    let s = best_s(7, || {
+        for _ in 0..motions {
+            k += 1;
+            let ahead_m = 0.01 * f64::from(k);
+            let to = [ahead_m, 0.05 * sin(ahead_m), 0.05 * (1.0 - cos(ahead_m))];
+            let request = MotionRequest::from_operator(0, to);
+            let nothing = Obstacles::default();
+            let outcome = propagator.propagate(&mut chain, &nothing, &request).expect("right");
+            assert!(outcome.motion().is_some(), "nothing is in the way");
+        }
+    });
+    1e6 * s / motions as f64
+}
+
 /// Microseconds per motion.
 fn pull_beside(n: usize, motions: usize, self_collision: bool, far: bool) -> f64 {
     let balls = if far { vec![Obstacle::ball(1, [0.0, 0.0, 1e4], 0.5)] } else { Vec::new() };
@@ -354,11 +396,12 @@ fn corridors() {
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let parts: [(&str, fn()); 7] = [
+    let parts: [(&str, fn()); 8] = [
         ("open", open),
         ("middle", middle),
         ("wavefront", lanes),
         ("own", own),
+        ("straight", straight),
         ("field", field),
         ("corridor", corridor),
         ("corridors", corridors),

@@ -19,8 +19,8 @@ pub enum RotationRule {
 pub struct ReactionRules {
     /// Reaction of a rod that hits an obstacle.
     pub rotation: RotationRule,
-    /// Whether the chain's own parts are obstacles to it (discs more than one index apart, rods
-    /// more than two).
+    /// Whether the chain's own parts are obstacles to it: all but those of one joint, see
+    /// [`Chain::min_separation_m`](super::Chain::min_separation_m).
     pub self_collision: bool,
     /// Longest move of a slave in one sub-step, meters; infinite for no limit.
     pub slave_step_max_m: f64,

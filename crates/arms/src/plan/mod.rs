@@ -32,6 +32,8 @@ const MAX_GOALS: usize = 4;
 /// Largest number of searches for them, three for each: those from random postures may end at a
 /// posture known already, or at one that touches something.
 const MAX_SEARCHES: usize = 12;
+/// Random postures that trees grow toward, at most.
+const MAX_SAMPLES: usize = 2_000;
 /// Restarts of one search; few, because the next search from another posture is worth more.
 const MAX_RESTARTS: usize = 25;
 
@@ -53,6 +55,12 @@ pub type ChainPosture<const D: usize> = Vec<Point<D>>;
 pub trait ConfigurationSpace {
     /// A node of a tree.
     type Posture: Clone;
+
+    /// Returns the largest number of random postures that trees grow toward, so that the search for a target that is cut
+    /// off ends.
+    fn max_samples(&self) -> usize {
+        MAX_SAMPLES
+    }
 
     /// Returns the posture that paths start from.
     fn present_posture(&self) -> Self::Posture;
@@ -96,7 +104,27 @@ pub fn plan<const D: usize>(
     let goals = goals(&space, rules, query, draws)?;
     let mut vias = space.uncurling_postures(query);
     vias.retain(|posture| space.is_free(posture));
-    Ok(find_path(&space, vias, goals, draws))
+    let path = find_path(&space, vias, goals, draws);
+    Ok(path.map(|path| refined_path(&space, path)))
+}
+
+/// Returns a path with postures so near each other that it does not matter from which of them the rest is followed: on a
+/// long piece some rods turn before others, and a chain that starts in its middle would turn them in another order than
+/// the one that was checked.
+fn refined_path<const D: usize>(
+    space: &ChainConfigurationSpace<'_, D>,
+    path: Vec<ChainPosture<D>>,
+) -> Vec<ChainPosture<D>> {
+    let mut refined = Vec::new();
+    let mut from = space.present_posture();
+    for to in path {
+        let n = (space.distance_m(&from, &to) / space.refined_step_m()).ceil().max(1.0) as usize;
+        for step in 1..=n {
+            refined.push(space.interpolate(&from, &to, step as f64 / n as f64));
+        }
+        from = to;
+    }
+    refined
 }
 
 /// Plans a path of an arm to a target, as [`plan`] does: the joint values after the present ones.

@@ -1,6 +1,6 @@
 //! Postures of a chain, and the straight path between two.
 
-use super::{ChainPosture, ConfigurationSpace};
+use super::{ChainPosture, ConfigurationSpace, MAX_SAMPLES};
 use crate::ik::constraints::ConstraintChecker;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
@@ -91,6 +91,11 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
         self.limbs.iter().map(Vec::as_slice)
     }
 
+    /// Returns the longest move of a connector between two postures of a path that is followed, meters.
+    pub(super) fn refined_step_m(&self) -> f64 {
+        REFINED_STEPS * self.step_m
+    }
+
     /// Returns the mean length of the rod between two neighbors, meters.
     pub(super) fn mean_length_m(&self, i: usize, j: usize) -> f64 {
         let rod = self.chain().rod_between(i, j);
@@ -140,6 +145,11 @@ fn held_twice_error(one: usize, other: usize) -> InputError {
 
 impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
     type Posture = ChainPosture<D>;
+
+    fn max_samples(&self) -> usize {
+        let rods = self.chain().rods().len().max(1);
+        (MAX_SAMPLE_EFFORT / (rods * rods)).clamp(MIN_SAMPLES, MAX_SAMPLES)
+    }
 
     fn present_posture(&self) -> ChainPosture<D> {
         self.checker.chain.points().to_vec()
@@ -219,6 +229,13 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
     }
 }
 
+/// Steps from one posture of a path that is followed to the next.
+const REFINED_STEPS: f64 = 8.0;
+/// Pairs of rods that the random postures of a search have, all together: as many as 2,000 postures of 8 rods. A check of a
+/// posture takes time with the number of its pairs, and a search must not hold up a run.
+const MAX_SAMPLE_EFFORT: usize = 128_000;
+/// Random postures of a search at least.
+const MIN_SAMPLES: usize = 60;
 /// Longest move of a connector between two postures that are checked, in steps: with linear interpolation
 /// of directions, the middle of a wide turn is faster than its ends.
 const MAX_STEPS: f64 = 3.0;

@@ -4,9 +4,6 @@ use super::ConfigurationSpace;
 use sidestep_kernel::interrupt;
 use sidestep_kernel::stream::Draws;
 
-/// Largest number of random postures that the trees grow toward, so that the search for a target
-/// that is cut off ends.
-const MAX_SAMPLES: usize = 2_000;
 /// Longest move of a connector between two postures of a tree, in lengths of the chain. The path of a stride is checked in
 /// far shorter steps, so it sets only how dense the trees are.
 const MAX_STRIDE: f64 = 0.1;
@@ -84,7 +81,7 @@ pub(super) fn find_path<S: ConfigurationSpace>(
     let max_strides = (MAX_SEGMENT / MAX_STRIDE).ceil() as usize;
     let mut trees = [PostureTree::new(vec![present.clone()]), PostureTree::new(goals.clone())];
     let towards_goals = goals.into_iter().chain(vias).map(|to| (to, max_strides));
-    let drawn = std::iter::repeat_with(|| None).take(MAX_SAMPLES);
+    let drawn = std::iter::repeat_with(|| None).take(space.max_samples());
     for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
         interrupt::check();
         // The trees take turns; the first tries are straight to the goals and the postures on the way.

@@ -48,7 +48,7 @@ pub enum EventKind {
     Done,
     /// A task was given up, or ended with none of its targets reached; the value is its number.
     GivenUp,
-    /// A planner has found a path to a target; the value is the number of its straight pieces.
+    /// A planner has found a path to a target; the value is the number of its postures.
     Planned,
     /// A planner has found no path to a target; the value is the target's number.
     NotPlanned,

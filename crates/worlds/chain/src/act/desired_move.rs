@@ -129,12 +129,16 @@ fn step_to_target<const D: usize>(
     targets: &Targets<D>,
 ) -> DesiredMove<D> {
     let at = initiator.position(acting.body);
+    let is_planned = acting.body.plan.is_some();
     let driving = &mut acting.body.driving;
     let Some(&target) = targets.places.get(driving.next as usize) else {
         return DesiredMove::Done;
     };
     let left_m = distance(at, target);
-    driving.late = if left_m < driving.nearest_m { 0 } else { driving.late.saturating_add(1) };
+    // On a planned path a chain goes away from its target at first, and that is no time lost.
+    if !is_planned {
+        driving.late = if left_m < driving.nearest_m { 0 } else { driving.late.saturating_add(1) };
+    }
     driving.nearest_m = driving.nearest_m.min(left_m);
     if left_m > targets.tolerance_m {
         plan_if_stuck(initiator, acting, targets);

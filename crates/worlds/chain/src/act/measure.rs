@@ -10,8 +10,11 @@ use sidestep_rods::{Chain, RodBvh, nearest_own_parts};
 /// Number of rods up to which a chain's gap to itself is measured in each cycle: the measurement takes time that
 /// grows faster than the chain.
 const MAX_MEASURED_RODS: usize = 32;
-/// Number of cycles between two measurements of longer chains, a third of a second of the usual cycles.
+/// Number of cycles between two measurements of longer chains, a third of a second of the usual cycles, for each
+/// thousand of their rods: so a measurement takes the same share of the time of a cycle however long the chain is.
 const MEASURE_INTERVAL_CYCLES: u64 = 16;
+/// The rods for which that is the interval.
+const RODS_PER_INTERVAL: usize = 1024;
 
 /// Measures a chain after its cycle; `robots_gap_m` is the least gap around its robots.
 pub(super) fn measure_chain<const D: usize>(
@@ -34,8 +37,9 @@ pub(super) fn measure_chain<const D: usize>(
         tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
     }
     // Parts that cross stay crossed for many cycles, so rare measurements of a long chain find them, too.
-    let is_due =
-        chain.rods().len() <= MAX_MEASURED_RODS || now.is_multiple_of(MEASURE_INTERVAL_CYCLES);
+    let rods = chain.rods().len();
+    let interval = MEASURE_INTERVAL_CYCLES * rods.div_ceil(RODS_PER_INTERVAL) as u64;
+    let is_due = rods <= MAX_MEASURED_RODS || now.is_multiple_of(interval);
     if is_whole && is_due && world.rules.self_collision {
         measure_own_body(chain, tally, own, look_m);
     }

@@ -89,12 +89,6 @@ fn move_held_chain<const D: usize>(
         if veto.reason == VetoReason::SelfCollision {
             return Ok((MotionOutcome::Vetoed(veto), f64::INFINITY));
         }
-        if veto.obstacle.is_none()
-            && let Some(by) = reach_limiting_connector(chain, order)
-        {
-            let veto = Veto { by, reason: VetoReason::OutOfReach, ..veto };
-            return Ok((MotionOutcome::Vetoed(veto), f64::INFINITY));
-        }
     }
     let motion = RequestedMotion::Connector { k, to: target };
     let request = MotionRequest { motion, ..*request };

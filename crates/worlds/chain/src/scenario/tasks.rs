@@ -167,12 +167,13 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     }
 
     /// Returns whether tasks of a chain plan paths unless they say otherwise: with a fixed base always, and otherwise where
-    /// plans are cheap and stay right, because the chain is short, held at one connector at most, moved as a whole, and
-    /// nothing moves around it.
+    /// its own body can be in its way and plans are cheap and stay right, because the chain is short, held at one connector
+    /// at most, moved as a whole, and nothing moves around it.
     fn plans_usually(&self, section: &ChainSection<D>, chain: &Chain<D>) -> bool {
         let held = chain.connectors().iter().filter(|c| c.mobility != Mobility::Free).count();
         let has_base = chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed);
         let is_alone = self.file.chain.deployment == Deployment::Direct
+            && self.file.chain.self_collision != Some(false)
             && section.robots.is_none()
             && !self.has_movers();
         held <= 1 && (has_base || is_alone && chain.rods().len() <= MAX_PLANNED_RODS)
