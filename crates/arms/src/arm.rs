@@ -1,6 +1,7 @@
 //! An arm of joints as a chain of rods (slides K1 to K4).
 
 use super::kinematics::{ArmGoal, ConnectorTargetSolver, SerialChain, Skeleton, Vector};
+use super::motion::MotionFilter;
 use sidestep_import::report::Finding;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, convert_dimensions, sub};
@@ -27,17 +28,20 @@ pub struct Arm {
     pub values: Vec<f64>,
     /// Finds joint values that follow its connectors.
     pub follower: ConnectorTargetSolver,
+    /// Keeps the joints to their rates.
+    pub motion: MotionFilter,
     /// What was not taken as it stood in its files; none where it is of no file.
     pub findings: Vec<Finding>,
 }
 
 impl Arm {
-    /// Returns an arm at a posture. Values that are outside their limits by rounding are put inside.
-    pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>) -> Self {
+    /// Returns an arm at a posture, whose joints move as the filter lets them. Values that are outside their limits by
+    /// rounding are put inside.
+    pub fn new(serial: SerialChain, at_m: Vector, values: Vec<f64>, motion: MotionFilter) -> Self {
         let skeleton = serial.skeleton();
         let follower = ConnectorTargetSolver::new(&serial, &skeleton);
         let values = follower.clamp(values);
-        Self { values, skeleton, serial, at_m, follower, findings: Vec::new() }
+        Self { values, skeleton, serial, at_m, follower, motion, findings: Vec::new() }
     }
 
     /// Returns the arm as a chain with a fixed base: the guide of its joints. Joint limits become bend limits if

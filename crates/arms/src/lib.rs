@@ -4,6 +4,7 @@
 mod arm;
 pub mod ik;
 pub mod kinematics;
+pub mod motion;
 pub mod plan;
 
 pub use arm::Arm;

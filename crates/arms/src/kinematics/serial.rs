@@ -17,7 +17,7 @@ pub struct SerialChain {
     pub tip: String,
     /// The variables, in the order from base to tip.
     pub variables: Vec<Dof>,
-    pub(super) joints: Vec<MovingJoint>,
+    pub(crate) joints: Vec<MovingJoint>,
     /// The tip in the last link.
     pub(super) to_tip: Transform,
 }
@@ -74,22 +74,22 @@ impl JointMotionKind {
 
 /// A joint that can move, with the fixed joints before it merged into it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct MovingJoint {
-    pub(super) name: String,
-    pub(super) motion: JointMotionKind,
+pub(crate) struct MovingJoint {
+    pub(crate) name: String,
+    pub(crate) motion: JointMotionKind,
     /// The joint's frame in the link before it.
     pub(super) origin: Transform,
     pub(super) axis: Vector,
     pub(super) limits: Option<Limits>,
-    pub(super) max_speed: Option<f64>,
-    pub(super) drive: JointCoupling,
+    pub(crate) max_speed: Option<f64>,
+    pub(crate) drive: JointCoupling,
 }
 
 /// A joint's value: `multiplier * values[variable] + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct JointCoupling {
-    pub(super) variable: usize,
-    pub(super) multiplier: f64,
+pub(crate) struct JointCoupling {
+    pub(crate) variable: usize,
+    pub(crate) multiplier: f64,
     pub(super) offset: f64,
 }
 

@@ -8,6 +8,7 @@
 //! The XML is read with `roxmltree` instead of `urdf-rs`, because errors of the latter have no
 //! line, it does not read SRDF, and it would add an XML reader of its own.
 
+pub mod joint_limits;
 mod limits;
 mod mesh_files;
 mod numbers;

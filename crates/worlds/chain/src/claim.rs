@@ -56,8 +56,23 @@ fn cycle_reach_box<const D: usize>(
     let changes = spec.changes.iter();
     let back_m_s = changes.map(|change| change.gather_speed_m_s(now)).fold(gathering_m_s, f64::max);
     let chain_box = Aabb::from_points(chain.points())
+        .joined(&reference_box(spec, body))
         .grown(radius_m + moved_m + thrown_m + back_m_s * world.dt_s);
     chain_box.joined(&robots_reach_box(spec, body, world.dt_s))
+}
+
+/// Returns the box of the places that an arm's joints may take on their way to their reference; none of other chains, or
+/// while they rest.
+fn reference_box<const D: usize>(spec: &ChainSpec<D>, body: &ChainBodyState<D>) -> Aabb<D> {
+    let (Some(arm), Some(joints)) = (&spec.arm, &body.joints) else { return Aabb::empty() };
+    if body.motion.is_at_rest() {
+        return Aabb::empty();
+    }
+    let reference = body.motion.reference(joints);
+    let turns = reference.iter().zip(joints).map(|(to, from)| (to - from).abs());
+    // A bound on the distance from where the joints are, whatever lies between.
+    let way_m: f64 = turns.zip(arm.follower.levers_m()).map(|(turn, lever_m)| turn * lever_m).sum();
+    Aabb::from_points(&arm.connector_positions(reference)).grown(way_m)
 }
 
 /// Returns the box that the robots of a chain may enter during one cycle. A robot that lags is far from its connector.

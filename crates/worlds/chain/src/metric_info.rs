@@ -1,6 +1,6 @@
 //! The metrics of a run in words, for reports.
 
-use super::metrics::{EscapeTally, Metrics, RobotMetrics, RungTally};
+use super::metrics::{ArmMetrics, EscapeTally, Metrics, RobotMetrics, RungTally};
 use sidestep_scenario::MetricInfo;
 use std::sync::LazyLock;
 
@@ -11,6 +11,7 @@ pub(super) static METRIC_INFO: LazyLock<Vec<MetricInfo>> = LazyLock::new(|| {
     infos.extend(RungTally::infos());
     infos.extend(EscapeTally::infos());
     infos.extend(RobotMetrics::infos());
+    infos.extend(ArmMetrics::infos());
     infos.extend(TABLE_INFO);
     infos
 });

@@ -5,6 +5,8 @@ use super::motion::escape::EscapeReport;
 use super::motion::recovery::RecoveryOutcome;
 use super::swarm::follower::FollowResult;
 use serde::{Deserialize, Serialize};
+use sidestep_arms::Arm;
+use sidestep_arms::motion::JointRates;
 use sidestep_kernel::EntityId;
 use sidestep_rods::{CompletedMotion, VetoReason};
 use sidestep_scenario::metrics;
@@ -42,6 +44,8 @@ pub struct ChainTally {
     pub max_slave_step_m: f64,
     /// Greatest speed of any connector, m/s.
     pub max_speed_m_s: f64,
+    /// Greatest rates of each joint of an arm, from base to tip; none of other chains.
+    pub joint_peaks: Vec<JointPeaks>,
     /// Distance traveled by its initiators, meters.
     pub way_m: f64,
     /// Rods turned to avoid something.
@@ -78,6 +82,17 @@ pub struct ChainTally {
     pub deadlines_missed: u64,
     /// Steps in which the chain stood because of that.
     pub stood: u64,
+}
+
+/// The greatest rates of a joint, in rad or m per s, s2 and s3: differences of its values in successive cycles.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct JointPeaks {
+    /// Greatest speed.
+    pub max_speed: f64,
+    /// Greatest acceleration.
+    pub max_acceleration: f64,
+    /// Greatest jerk.
+    pub max_jerk: f64,
 }
 
 metrics! {
@@ -226,6 +241,16 @@ impl ChainTally {
         self.max_slave_step_m = self.max_slave_step_m.max(moved.max_slave_step_m);
     }
 
+    /// Records the rates of an arm's joints in a cycle.
+    pub(crate) fn add_joint_rates(&mut self, rates: &[JointRates]) {
+        self.joint_peaks.resize(rates.len(), JointPeaks::default());
+        for (peaks, rates) in self.joint_peaks.iter_mut().zip(rates) {
+            peaks.max_speed = peaks.max_speed.max(rates.speed);
+            peaks.max_acceleration = peaks.max_acceleration.max(rates.acceleration);
+            peaks.max_jerk = peaks.max_jerk.max(rates.jerk);
+        }
+    }
+
     pub(crate) fn add_network_traffic(&mut self, traffic: NetworkTraffic) {
         self.messages += traffic.messages;
         self.bytes += traffic.bytes;
@@ -262,6 +287,7 @@ impl Default for ChainTally {
             max_rod_violation_m: 0.0,
             max_slave_step_m: 0.0,
             max_speed_m_s: 0.0,
+            joint_peaks: Vec::new(),
             way_m: 0.0,
             rotations: 0,
             moved: 0,
@@ -365,6 +391,47 @@ metrics! {
         /// Metrics of robots on wheels, if there are any.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub robots: Option<RobotMetrics>,
+        /// Metrics of the joints of arms, if there are any.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub arms: Option<ArmMetrics>,
+    }
+}
+
+metrics! {
+    /// Metrics of the joints of all arms. Each joint is compared with its own limit.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct ArmMetrics in "arms." {
+        /// Greatest speed of a joint, divided by its limit.
+        pub max_speed_ratio: f64 => "greatest speed of a joint by its limit",
+        /// Greatest acceleration of a joint, divided by its limit.
+        pub max_acceleration_ratio: f64 => "greatest acceleration of a joint by its limit",
+        /// Greatest jerk of a joint, divided by its limit.
+        pub max_jerk_ratio: f64 => "greatest jerk of a joint by its limit",
+    }
+}
+
+impl ArmMetrics {
+    /// Returns the metrics of the arms among the chains; none if there are none.
+    pub(super) fn from_tallies<'a>(
+        arms: impl Iterator<Item = (&'a Arm, &'a ChainTally)>,
+    ) -> Option<Self> {
+        let mut all: Option<Self> = None;
+        for (arm, tally) in arms {
+            let all = all.get_or_insert(Self {
+                max_speed_ratio: 0.0,
+                max_acceleration_ratio: 0.0,
+                max_jerk_ratio: 0.0,
+            });
+            for (peaks, limits) in tally.joint_peaks.iter().zip(arm.motion.rates()) {
+                let speed = peaks.max_speed / limits.speed;
+                let acceleration = peaks.max_acceleration / limits.acceleration;
+                let jerk = peaks.max_jerk / limits.jerk;
+                all.max_speed_ratio = all.max_speed_ratio.max(speed);
+                all.max_acceleration_ratio = all.max_acceleration_ratio.max(acceleration);
+                all.max_jerk_ratio = all.max_jerk_ratio.max(jerk);
+            }
+        }
+        all
     }
 }
 
@@ -423,9 +490,25 @@ pub struct ChainMetrics {
     /// Joint values of an arm, rad or m, by name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<BTreeMap<String, f64>>,
+    /// Highest rates that its joints may have, by joint from base to tip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint_limits: Option<Vec<JointLimits>>,
     /// Its counts, beside these in one object.
     #[serde(flatten)]
     pub tally: ChainTally,
+}
+
+/// The limits of a joint's rates, in rad or m per s, s2 and s3.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointLimits {
+    /// Name of the joint.
+    pub name: String,
+    /// Highest speed.
+    pub speed: f64,
+    /// Highest acceleration.
+    pub acceleration: f64,
+    /// Highest jerk.
+    pub jerk: f64,
 }
 
 impl Metrics {
@@ -473,6 +556,7 @@ impl Metrics {
             deadlines_missed: sum_over_chains(tallies, |t| t.deadlines_missed),
             stood: sum_over_chains(tallies, |t| t.stood),
             robots: has_robots.then(|| RobotMetrics::from_tally(&robots)),
+            arms: None,
         }
     }
 }

@@ -111,10 +111,10 @@ fn slow_network_remark<const D: usize>(
 fn unlimited_speeds_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
     let arm = spec.arm.as_deref()?;
     let mut taken = Vec::new();
-    for (joint, speed) in arm.serial.variables.iter().zip(arm.follower.max_speeds()) {
+    for (joint, rates) in arm.serial.variables.iter().zip(arm.motion.rates()) {
         if joint.max_speed.is_none() {
             let unit = if joint.motion == JointMotionKind::Turn { "rad/s" } else { "m/s" };
-            taken.push(format!("`{}` {speed:.4} {unit}", joint.name));
+            taken.push(format!("`{}` {:.4} {unit}", joint.name, rates.speed));
         }
     }
     if taken.is_empty() {

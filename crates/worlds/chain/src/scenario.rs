@@ -405,10 +405,15 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         Ok(compiled)
     }
 
+    /// Returns the duration of a cycle, s.
+    fn dt_s(&self) -> f64 {
+        self.file.chain.dt_s.map_or(DEFAULT_DT_S, f64::from)
+    }
+
     fn world(&self, cycles: u64) -> Result<ChainWorld<D>, InputError> {
         let section = &self.file.chain;
         let reaction = self.reaction()?;
-        let dt_s = section.dt_s.map_or(DEFAULT_DT_S, f64::from);
+        let dt_s = self.dt_s();
         let chains = match self.known.filter(|_| !self.file.has_random_start()) {
             Some(known) => Arc::clone(&known.chains),
             None => Arc::new(self.chains(dt_s, self.site)?),

@@ -27,6 +27,8 @@ pub struct Scratch<const D: usize> {
     pub(crate) own_rods: RodBvh<D>,
     /// Positions of a chain before a cycle.
     pub(crate) before: PositionBuffer<D>,
+    /// Where the chain that acts was before the cycle, also if it is an arm that follows a reference.
+    pub(crate) actual: PositionBuffer<D>,
     /// Positions of a chain after parts of it escaped.
     pub(crate) escaped: PositionBuffer<D>,
     /// Events of this task.
@@ -70,6 +72,7 @@ impl<const D: usize> Scratch<D> {
             scan: LaserScan::default(),
             own_rods: RodBvh::default(),
             before: PositionBuffer::default(),
+            actual: PositionBuffer::default(),
             escaped: PositionBuffer::default(),
             events: Vec::new(),
             trace: None,

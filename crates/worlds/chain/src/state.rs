@@ -241,6 +241,7 @@ impl<const D: usize> ChainWorldState<D> {
             cycle,
             chains: bodies.map(|slot| self.body(slot).record()).collect(),
             joints: self.save_component(cycle, |body| &body.joints),
+            motions: self.save_component(cycle, |body| &body.motion),
             plans: self.save_component(cycle, |body| &body.plan),
             escape_plans: self.save_component(cycle, |body| &body.escape_plan),
             standstills: self.save_component(cycle, |body| &body.standstill),

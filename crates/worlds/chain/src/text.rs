@@ -1,7 +1,7 @@
 //! Texts for people: a scenario's contents, a run's outcome, and all positions.
 
 use super::deploy::deployment::Deployment;
-use super::metrics::{ChainAbandonedSubtask, Metrics, RobotMetrics};
+use super::metrics::{ArmMetrics, ChainAbandonedSubtask, Metrics, RobotMetrics};
 use super::scenario::ChainScenario;
 use super::state::Snapshot;
 use serde_json::{Value, json};
@@ -90,6 +90,7 @@ pub(super) fn describe_poses<const D: usize>(snapshot: &Snapshot) -> JsonTextRep
 pub(super) fn summary_lines(m: &Metrics) -> KeyValues {
     let mut lines = motion_lines(m);
     lines.extend(m.robots.as_ref().map(robots));
+    lines.extend(m.arms.as_ref().map(joints));
     lines.extend(recovery_text(m));
     lines.extend(network(m));
     if m.reformed > 0 {
@@ -179,6 +180,16 @@ fn robots(robots: &RobotMetrics) -> (String, String) {
             "{bumpers}; behind their connectors by {mean_m:.2} m on average, {max_m:.2} m at most"
         ),
     )
+}
+
+/// Returns how much of the limits of their rates the joints of arms used.
+fn joints(arms: &ArmMetrics) -> (String, String) {
+    let shares = [arms.max_speed_ratio, arms.max_acceleration_ratio, arms.max_jerk_ratio];
+    let [speed, acceleration, jerk] = shares.map(|share| format!("{:.1} %", 100.0 * share));
+    let words = format!(
+        "up to {speed} of their speed, {acceleration} of their acceleration, {jerk} of their jerk"
+    );
+    key_value_pair("joints", words)
 }
 
 fn not_reformed_text(m: &Metrics) -> String {

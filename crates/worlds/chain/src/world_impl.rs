@@ -2,7 +2,7 @@
 
 use super::events::Event;
 use super::metric_info::METRIC_INFO;
-use super::metrics::{ChainMetrics, ChainTally, Metrics};
+use super::metrics::{ArmMetrics, ChainMetrics, ChainTally, JointLimits, Metrics};
 use super::rows::RecordBuffers;
 use super::scenario::{AnyChainScenario, ChainScenario};
 use super::scratch::Scratch;
@@ -11,6 +11,7 @@ use super::text;
 use super::view::view_event;
 use super::world::ChainWorld;
 use serde_json::Value;
+use sidestep_arms::Arm;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::control::{AgentTeams, BufferMut, Order, OrderError};
 use sidestep_kernel::ports::{RecordError, Recorder, TableBuffers, TableSchema};
@@ -86,18 +87,34 @@ impl<const D: usize> ChainWorld<D> {
         let body = state.body(slot);
         let spec = &self.chains[slot];
         let mut joints = None;
+        let mut joint_limits = None;
         if let (Some(arm), Some(values)) = (&spec.arm, &body.joints) {
             let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
             joints = Some(names.zip(values.iter().copied()).collect());
+            joint_limits = Some(limits_of_joints(arm));
         }
         ChainMetrics {
             chain: slot as EntityId,
             name: spec.name.clone(),
             joints,
+            joint_limits,
             progress: self.progress(slot, &body),
             tally: body.tally.clone(),
         }
     }
+}
+
+/// Returns the names of an arm's joints and the limits of their rates.
+fn limits_of_joints(arm: &Arm) -> Vec<JointLimits> {
+    let joints = arm.serial.variables.iter().zip(arm.motion.rates());
+    joints
+        .map(|(variable, rates)| JointLimits {
+            name: variable.name.clone(),
+            speed: rates.speed,
+            acceleration: rates.acceleration,
+            jerk: rates.jerk,
+        })
+        .collect()
 }
 
 impl<const D: usize> World for ChainWorld<D> {
@@ -280,7 +297,12 @@ impl<const D: usize> WorldMetrics for ChainWorld<D> {
             (0..state.len()).map(|slot| self.progress(slot, &state.body(slot))).collect();
         let steps = tallies.iter().map(|t| t.steps).sum::<u64>() - collector.steps_before;
         let cpu_s = effort.cpu_ns as f64 / 1e9;
-        Metrics::from_tallies(&tallies, self.has_robots(), &progress, cpu_s, steps)
+        let arms = self.chains.iter().zip(&tallies);
+        let arms = arms.filter_map(|(spec, tally)| Some((spec.arm.as_deref()?, tally)));
+        Metrics {
+            arms: ArmMetrics::from_tallies(arms),
+            ..Metrics::from_tallies(&tallies, self.has_robots(), &progress, cpu_s, steps)
+        }
     }
 
     fn metric_meaning(&self, name: &str) -> &'static str {

@@ -2,7 +2,7 @@
 //!
 //! A chain of rods has more degrees of freedom than most arms: its motion is a guide. First all connectors are brought as near
 //! to their places in it as the joints can, then the connectors that lead are brought to theirs exactly. Both stay in
-//! a *room* of each variable: its limits, and the range that its speed allows in a cycle.
+//! a *room* of each variable: its limits, and the range that its rates allow in a cycle.
 
 use super::super::serial::{JointMotionKind, MovingJoint, SerialChain};
 use super::super::skeleton::{LinkAnchor, Skeleton};
@@ -10,11 +10,7 @@ use super::super::transform::Vector;
 use super::fast_fk::{FastFk, LinkTransforms};
 use super::step::{IkStepInput, IkStepper, JointRanges};
 use sidestep_kernel::geometry::{norm, sub};
-use std::f64::consts::PI;
 
-/// Speeds of joints without one in the model: half a turn a second, as the joints of a UR5, and 1 m/s.
-const DEFAULT_SPEED_RAD_S: f64 = PI;
-const DEFAULT_SPEED_M_S: f64 = 1.0;
 /// Weight of a connector's place in the guide, beside 1 of those that lead: they come first, and are then met exactly in a
 /// descent of their own.
 const GUIDE_WEIGHT: f64 = 0.3;
@@ -42,8 +38,6 @@ pub struct ConnectorTargetSolver {
     fast_fk: FastFk,
     anchors: Vec<LinkAnchor>,
     limits: JointRanges,
-    /// Highest speed of each variable, in rad/s or m/s.
-    speeds: Vec<f64>,
     /// Bound on the travel of any connector per unit of each variable, in m.
     levers_m: Vec<f64>,
     /// Length of the stretched arm, in m.
@@ -67,7 +61,6 @@ impl ConnectorTargetSolver {
         Self {
             fast_fk: FastFk::new(chain),
             limits: JointRanges::from_chain(chain),
-            speeds: max_speeds(chain),
             levers_m: levers_m(chain, &anchors),
             reach_m: skeleton.reach_m,
             blank: LinkTransforms::from_chain(chain),
@@ -85,11 +78,6 @@ impl ConnectorTargetSolver {
         // 1e-9 of the reach: descents that converge end far nearer, those that the room stops are
         // off by far more.
         1e4 * ARRIVAL_TOLERANCE * self.reach_m
-    }
-
-    /// Returns the highest speed of each variable, in rad/s or m/s.
-    pub fn max_speeds(&self) -> &[f64] {
-        &self.speeds
     }
 
     /// Returns the lowest and highest value of each variable; infinite where a joint has no limit.
@@ -111,25 +99,6 @@ impl ConnectorTargetSolver {
             .iter()
             .map(|anchor| placed.links[anchor.first].transform_point(anchor.point_m))
             .collect()
-    }
-
-    /// Returns the range of each variable within `dt_s` seconds from these values.
-    pub fn reachable_ranges(&self, values: &[f64], dt_s: f64) -> Vec<[f64; 2]> {
-        let variables = values.iter().zip(&self.speeds).zip(&self.limits.ranges);
-        let ranges = variables.map(|((value, speed), [lower, upper])| {
-            [(value - speed * dt_s).max(*lower), (value + speed * dt_s).min(*upper)]
-        });
-        ranges.collect()
-    }
-
-    /// Returns the fraction, at most 1, of the path from one posture to another that all joints can move along
-    /// in `dt_s` seconds.
-    pub fn reachable_fraction(&self, from: &[f64], to: &[f64], dt_s: f64) -> f64 {
-        let changes = from.iter().zip(to).zip(&self.speeds);
-        changes.fold(1.0, |fraction, ((a, b), speed)| match (b - a).abs() {
-            0.0 => fraction,
-            change => fraction.min(speed * dt_s / change),
-        })
     }
 
     /// Returns whether a variable is at an end of its limits.
@@ -271,29 +240,6 @@ fn merit(wanted: &[f64]) -> f64 {
     wanted.iter().map(|x| x * x).sum()
 }
 
-/// Returns the highest speed of each variable: joints that mimic another narrow its own.
-fn max_speeds(chain: &SerialChain) -> Vec<f64> {
-    let own = chain.variables.iter().map(|v| v.max_speed.unwrap_or(default_speed(v.motion)));
-    let mut speeds: Vec<f64> = own.collect();
-    for joint in &chain.joints {
-        let drive = joint.drive;
-        if drive.multiplier != 0.0 {
-            let own_speed = joint.max_speed.unwrap_or(default_speed(joint.motion));
-            let max_speed = own_speed / drive.multiplier.abs();
-            speeds[drive.variable] = speeds[drive.variable].min(max_speed);
-        }
-    }
-    speeds
-}
-
-/// Returns the speed of joints without one in the model, in rad/s or m/s.
-fn default_speed(motion: JointMotionKind) -> f64 {
-    match motion {
-        JointMotionKind::Turn => DEFAULT_SPEED_RAD_S,
-        JointMotionKind::Slide => DEFAULT_SPEED_M_S,
-    }
-}
-
 /// Returns bounds on the travel of any connector per unit of each variable: the lengths of all links between its joints
 /// and the connector.
 fn levers_m(chain: &SerialChain, anchors: &[LinkAnchor]) -> Vec<f64> {
@@ -329,9 +275,22 @@ fn max_joint_slide_m(joint: &MovingJoint) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::{MotionFilter, MotionState, joint_rates};
     use sidestep_import::urdf::Model;
+    use sidestep_import::urdf::joint_limits::{GivenRates, JointRates};
     use sidestep_kernel::geometry::add;
     use sidestep_testing::robot_model;
+
+    /// Returns what each joint can reach within 0.02 s at its highest speed.
+    fn room(
+        chain: &SerialChain,
+        follower: &ConnectorTargetSolver,
+        values: &[f64],
+    ) -> Vec<[f64; 2]> {
+        let filter =
+            MotionFilter::new(joint_rates(chain, &JointRates::new(), GivenRates::default()), 0.02);
+        filter.reference_ranges(&MotionState::default(), values, follower.limits())
+    }
 
     fn arm(model: &str) -> Option<(SerialChain, ConnectorTargetSolver)> {
         let model = Model::load(&robot_model(model)?).expect("a model");
@@ -368,7 +327,7 @@ mod tests {
                 let mut places = follower.connector_positions(&values);
                 places[tip] = add(places[tip], [-0.001, 0.001, -0.0005]);
                 let aim = ConnectorTarget { connector: tip, at_m: places[tip] };
-                let room = follower.reachable_ranges(&values, 0.02);
+                let room = room(&chain, &follower, &values);
                 let next = follower.track(&values, &room, Some(&places), &[aim]);
                 assert!(
                     next.iter().zip(&room).all(|(x, [a, b])| (a..=b).contains(&x)),

@@ -1,6 +1,7 @@
 //! The move that a chain's driver wants in a cycle.
 
 use super::bounds::EscapeContext;
+use super::joint_motion::has_followed;
 use super::joints::arrival_tolerance_m;
 use super::orders::motion_from_orders;
 use super::own_driver::ask_own_driver;
@@ -83,7 +84,7 @@ pub(super) fn desired_move<const D: usize>(
                 DesiredMove::Go(move_toward(at, convert_dimensions(to), initiator.step_m()))
             }
         },
-        TaskKind::Script(_) => script_move(initiator, acting.body),
+        TaskKind::Script(_) => script_move(initiator, acting),
         TaskKind::Targets(targets) => step_to_target(initiator, acting, targets),
     }
 }
@@ -149,6 +150,11 @@ fn step_to_target<const D: usize>(
     }
     let body = &mut *acting.body;
     body.plan = None;
+    let is_last = is_last_target(initiator, body, targets);
+    let arrives = |at| !is_last && distance(at, target) <= targets.tolerance_m;
+    if !has_followed(body, acting.actual, arrives, initiator.task.agent) {
+        return DesiredMove::Rest;
+    }
     let number = f64::from(body.driving.next);
     acting.sink.record(&body.chain, EventKind::Target, initiator.task.agent, number);
     body.tally.done += 1;
@@ -156,15 +162,27 @@ fn step_to_target<const D: usize>(
     DesiredMove::Rest
 }
 
+/// Returns whether the present target is the last one of all tasks, at which an arm comes to rest.
+fn is_last_target<const D: usize>(
+    initiator: Initiator<'_, D>,
+    body: &ChainBodyState<D>,
+    targets: &Targets<D>,
+) -> bool {
+    let driving = &body.driving;
+    driving.task as usize + 1 == initiator.context.spec.tasks.len()
+        && driving.next as usize + 1 == targets.places.len()
+}
+
 /// Returns the next move of a script. Turning takes no time.
 fn script_move<const D: usize>(
     initiator: Initiator<'_, D>,
-    body: &mut ChainBodyState<D>,
+    acting: &mut ChainCycleState<'_, D>,
 ) -> DesiredMove<D> {
+    let ChainCycleState { body, actual, .. } = acting;
     let at = initiator.position(body);
     let there_m = arrival_tolerance_m(initiator.context, &body.chain);
-    let driving = &mut body.driving;
     loop {
+        let driving = &mut body.driving;
         match body.motions.get(driving.next as usize) {
             None => return DesiredMove::Done,
             Some(ScriptMotion::Face { ahead }) => driving.ahead = *ahead,
@@ -183,8 +201,12 @@ fn script_move<const D: usize>(
                 if left_m > there_m {
                     return DesiredMove::Go(move_toward(at, to, initiator.step_m()));
                 }
+                let arrives = |at| distance(at, to) <= there_m;
+                if !has_followed(body, actual, arrives, initiator.task.agent) {
+                    return DesiredMove::Rest;
+                }
             }
         }
-        driving.start_next_subtask();
+        body.driving.start_next_subtask();
     }
 }

@@ -1,9 +1,11 @@
 //! Arms: the chain moves first as a guide, and the joints follow it within their limits and speeds. Forward
-//! kinematics then places the connectors, so an arm is never where its joints cannot be.
+//! kinematics then places the connectors, so an arm is never where its joints cannot be. All of this moves the
+//! *reference* of the joints, which they follow in time; see `joint_motion`.
 
 #[cfg(test)]
 mod tests;
 
+use super::joint_motion::StopCheck;
 use super::situation::has_held_connector;
 use super::{ChainContext, ChainCycleState, Initiator};
 use crate::clearance::min_clearance;
@@ -14,6 +16,7 @@ use crate::scratch::PositionBuffer;
 use crate::state::ChainBodyState;
 use sidestep_arms::Arm;
 use sidestep_arms::kinematics::ConnectorTarget;
+use sidestep_arms::motion::MotionState;
 use sidestep_arms::plan::{JointPosture, JointSpace};
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
@@ -69,6 +72,7 @@ pub(super) struct ArmJointSolver<'a, const D: usize> {
     arm: &'a Arm,
     chain: &'a mut Chain<D>,
     joints: &'a mut Vec<f64>,
+    motion: &'a MotionState,
 }
 
 /// Returns the distance at which an initiator is where a script wants it, meters: where a connector is held, return
@@ -128,7 +132,7 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
     ) -> Option<Self> {
         let arm = context.spec.arm.as_deref()?;
         let joints = body.joints.as_mut()?;
-        Some(Self { context, before, arm, chain: &mut body.chain, joints })
+        Some(Self { context, before, arm, chain: &mut body.chain, joints, motion: &body.motion })
     }
 
     /// Lets the joints carry out an order: all of it, or nothing.
@@ -171,7 +175,7 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
         for _ in 0..tries {
             for wanted in [&guided, &free] {
                 let posed = self.solve_posture(wanted, fraction);
-                let veto = self.find_veto(&from, &posed);
+                let veto = self.find_motion_veto(&from, &posed);
                 if veto.is_none() {
                     self.adopt(posed);
                     return Ok(());
@@ -192,7 +196,7 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
         let left_m = distance(posed.points[k], to);
         posed.led[0].to = posed.points[k];
         let comes = left_m <= (1.0 - MIN_APPROACH_FRACTION) * distance(from[k], to)
-            && self.find_veto(&from, &posed).is_none();
+            && self.find_motion_veto(&from, &posed).is_none();
         if comes {
             self.adopt(posed);
         }
@@ -252,10 +256,21 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
             led.push(LeadTarget { k, to });
             aims.push(ConnectorTarget { connector: k, at_m: arm.to_base(to) });
         }
-        let room = arm.follower.reachable_ranges(&self.before.joints, self.context.world.dt_s);
+        let limits = arm.follower.limits();
+        let room = arm.motion.reference_ranges(self.motion, &self.before.joints, limits);
         let joints = arm.follower.track(self.joints, &room, guide.as_deref(), &aims);
         let points = arm.connector_positions(&joints);
         ArmPosture { joints, points, led }
+    }
+
+    /// Returns the veto of a posture, or of the way on which the joints come to rest in it.
+    fn find_motion_veto(&mut self, from: &[Point<D>], posed: &ArmPosture<D>) -> Option<Veto<D>> {
+        if let Some(veto) = self.find_veto(from, posed) {
+            return Some(veto);
+        }
+        let k = posed.led.first().map_or(0, |led| led.k);
+        let stop = StopCheck { context: self.context, arm: self.arm, chain: self.chain, k };
+        stop.find_veto(self.motion, &self.before.joints, &posed.joints)
     }
 
     /// Returns the veto of a posture: by the joints, which do not take a connector to where it is led; by speeds; by

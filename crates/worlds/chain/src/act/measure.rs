@@ -28,7 +28,7 @@ pub(super) fn measure_chain<const D: usize>(
     let chain = &acting.body.chain;
     let tally = &mut acting.body.tally;
     tally.steps += 1;
-    let moves = acting.before.points.iter().zip(chain.points());
+    let moves = acting.actual.points.iter().zip(chain.points());
     let longest_m = moves.map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max);
     tally.max_speed_m_s = tally.max_speed_m_s.max(longest_m / world.dt_s);
     // In a broken chain only the parts count, because its rods hold nothing.

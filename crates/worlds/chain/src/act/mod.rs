@@ -10,7 +10,7 @@
 //!
 //! ```text
 //! broken.rs, gather.rs -> bounds.rs (escape) -> drive.rs -> bounds.rs (back into the claim) -> orders.rs
-//!                      -> follow.rs -> measure.rs
+//!                      -> joint_motion.rs -> follow.rs -> measure.rs
 //! drive.rs     -> desired_move.rs -> wheels.rs, plan.rs, orders.rs   what the initiator wants
 //!              -> own_driver.rs                                      ... by a driver of the program's own
 //!              -> lookahead.rs                                       whether it rests instead
@@ -28,6 +28,7 @@ mod event_sink;
 mod follow;
 mod gather;
 mod initiator;
+mod joint_motion;
 mod joints;
 mod lookahead;
 mod measure;
@@ -89,8 +90,10 @@ enum ChainFollowMode {
 /// A chain as it acts: what its cycle changes.
 struct ChainCycleState<'a, const D: usize> {
     body: &'a mut ChainBodyState<D>,
-    /// Its positions before the cycle.
+    /// Its positions before the cycle; of an arm those of its reference.
     before: &'a PositionBuffer<D>,
+    /// Where an arm was before the cycle; of other chains the same positions.
+    actual: &'a PositionBuffer<D>,
     propagator: &'a mut Propagator<D>,
     negotiation: Negotiation<'a, D>,
     sink: EventSink<'a, D>,
@@ -143,15 +146,20 @@ fn run_cycle<const D: usize>(
     let follows = ChainFollowMode::choose_follow_mode(context, body);
     if follows != ChainFollowMode::Deferred {
         body.apply_deferred_motions();
+        scratch.actual.record(body);
+    }
+    let joints = joint_motion::start_cycle(context, body);
+    if follows != ChainFollowMode::Deferred {
         scratch.before.record(body);
         scratch.escaped.record(body);
     }
     let mut escaping =
         EscapeContext { escaper: scratch.escaper.as_mut(), escaped: &mut scratch.escaped, claim };
     let before = &scratch.before;
+    let actual = &scratch.actual;
     let propagator = &mut scratch.propagator;
     let negotiation = Negotiation::new(scratch.percept_log.as_mut());
-    let mut acting = ChainCycleState { body, before, propagator, negotiation, sink };
+    let mut acting = ChainCycleState { body, before, actual, propagator, negotiation, sink };
     if follows == ChainFollowMode::Deferred {
         let lead_context =
             InitiatorContext { inputs, follows, escaping: &escaping, is_pressed: false };
@@ -165,6 +173,7 @@ fn run_cycle<const D: usize>(
     } else {
         act_whole_chain(context, &mut acting, &mut escaping, inputs, follows);
     }
+    joint_motion::finish_cycle(context, acting.body, joints);
     let solid = scratch.nearby.obstacles_solid_to_robots();
     let robots_gap_m =
         follow::move_swarm_robots(context, &mut acting, solid, &mut scratch.robot_bodies);

@@ -1,5 +1,6 @@
 //! Paths that are planned once local rules come no nearer to a target.
 
+use super::joint_motion::StopCheck;
 use super::{ChainContext, ChainCycleState, Initiator};
 use crate::driver::Targets;
 use crate::events::EventKind;
@@ -156,24 +157,32 @@ fn follow_joint_path<const D: usize>(
     let self_collision = world.rules.self_collision;
     let present = JointPosture { arm, joints: &joints };
     let space = JointSpace::new(present, chain, obstacles, self_collision, initiator.task.agent);
-    let dt_s = world.dt_s;
     let to = path.front()?;
     let mut limits = StepLimits::from_initiator(initiator);
     if let Some(escape) = &world.escape {
-        limits.joint = limits.joint.min(escape.speed_max_m_s * dt_s);
+        limits.joint = limits.joint.min(escape.speed_max_m_s * world.dt_s);
     }
-    let fraction = arm.follower.reachable_fraction(&joints, to, dt_s);
+    let motion = &body.motion;
+    let fraction = arm.motion.reachable_fraction(motion, &joints, to);
     let segment = PathSegment { space: &space, from: &joints, to };
     let (mut next, is_there) =
         limits.next_posture(&segment, fraction, |values| arm.connector_positions::<D>(values));
     // Rounding must not make a motion at exactly the maximum speed faster.
-    for (x, [lower, upper]) in next.iter_mut().zip(arm.follower.reachable_ranges(&joints, dt_s)) {
+    let ranges = arm.motion.reference_ranges(motion, &joints, arm.follower.limits());
+    for (x, [lower, upper]) in next.iter_mut().zip(ranges) {
         *x = x.clamp(lower, upper);
     }
     let from = chain.points().to_vec();
-    if !space.is_path_free(&joints, &next)
-        || !move_along(initiator, body, &from, &arm.connector_positions(&next))
-    {
+    if !space.is_path_free(&joints, &next) {
+        return None;
+    }
+    // The joints cut the corners of a path at which the reference does not stop. Where they would touch something, it
+    // waits for them before it goes on.
+    let stop = StopCheck { context: initiator.context, arm, chain, k: initiator.task.agent };
+    if !motion.is_at_rest() && stop.find_veto(motion, &joints, &next).is_some() {
+        return Some(path);
+    }
+    if !move_along(initiator, body, &from, &arm.connector_positions(&next)) {
         return None;
     }
     body.joints = Some(next);

@@ -1,12 +1,14 @@
 //! Arms from URDF files.
 
-use super::ChainScenarioCompiler;
+use super::{ChainScenarioCompiler, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
 use sidestep_arms::kinematics::SerialChain;
+use sidestep_arms::motion::{MotionFilter, joint_rates};
 use sidestep_import::report::Finding;
 use sidestep_import::urdf::Model;
+use sidestep_import::urdf::joint_limits::{self, GivenRates, JointRates};
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_kernel::InputError;
 use sidestep_scenario::Spanned;
@@ -29,6 +31,25 @@ pub(super) struct ArmSection {
     posture: Option<String>,
     /// Values of the joints at the start, in radians or meters.
     joints: Option<Vec<f64>>,
+    /// File of the highest speeds, accelerations and jerks of joints (joint_limits.yaml of MoveIt).
+    joint_limits: Option<String>,
+    /// Highest speed of all joints, in rad/s or m/s.
+    max_velocity: Option<PositiveNumber>,
+    /// Highest acceleration of all joints, in rad/s2 or m/s2.
+    max_acceleration: Option<PositiveNumber>,
+    /// Highest jerk of all joints, in rad/s3 or m/s3.
+    max_jerk: Option<PositiveNumber>,
+}
+
+impl ArmSection {
+    /// Returns the rates that no joint exceeds.
+    fn highest_rates(&self) -> GivenRates {
+        GivenRates {
+            speed: self.max_velocity.map(f64::from),
+            acceleration: self.max_acceleration.map(f64::from),
+            jerk: self.max_jerk.map(f64::from),
+        }
+    }
 }
 
 impl<const D: usize> ChainScenarioCompiler<'_, D> {
@@ -66,8 +87,11 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let values = self.values(s, (&model, &serial), semantics.as_ref(), at.clone())?;
         serial
             .check_limits("joints", &values)
-            .map_err(|error| self.invalid_posture_error(at, &error))?;
-        Ok(Arm { findings, ..Arm::new(serial, at_m, values) })
+            .map_err(|error| self.invalid_posture_error(at.clone(), &error))?;
+        let given = self.joint_limits(s, &serial, at)?;
+        let rates = joint_rates(&serial, &given, s.highest_rates());
+        let motion = MotionFilter::new(rates, self.dt_s());
+        Ok(Arm { findings, ..Arm::new(serial, at_m, values, motion) })
     }
 
     /// Returns the link that a key names; errors point at that key.
@@ -119,6 +143,27 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let Some(file) = &s.srdf else { return Ok(None) };
         let semantics = Semantics::load(&self.source.path(file.as_ref()), model);
         self.source.with_file_key(at, "srdf", semantics).map(Some)
+    }
+
+    /// Returns the rates of joints in a file of them, if one is named.
+    fn joint_limits(
+        &self,
+        s: &ArmSection,
+        serial: &SerialChain,
+        at: Range<usize>,
+    ) -> Result<JointRates, InputError> {
+        let Some(file) = &s.joint_limits else { return Ok(JointRates::new()) };
+        let rates = joint_limits::load(&self.source.path(file.as_ref()));
+        let rates = self.source.with_file_key(at.clone(), "joint_limits", rates)?;
+        // Files have the joints of grippers too; one with none of the arm's is that of another robot.
+        if !serial.variables.iter().any(|variable| rates.contains_key(&variable.name)) {
+            let names: Vec<&str> = serial.variables.iter().map(|v| v.name.as_str()).collect();
+            let at = self.source.key_span(at, &["joint_limits"]);
+            let cause = "the file has no joint of this arm";
+            let remedy = format!("give limits of some of: {}", names.join(", "));
+            return Err(self.source.error(at, cause, remedy));
+        }
+        Ok(rates)
     }
 
     /// Returns the joint values at the start: given, of a named posture, or at rest.

@@ -13,6 +13,7 @@ use crate::swarm::drive::Pose2;
 use crate::swarm::leader::LeaderState;
 use crate::world::ChainSpec;
 use serde::{Deserialize, Serialize};
+use sidestep_arms::motion::MotionState;
 use sidestep_kernel::math::atan2;
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_rods::Chain;
@@ -48,6 +49,8 @@ pub struct ChainBodyState<const D: usize> {
     pub(crate) external: ExternalControlState,
     /// Joint values of an arm, in rad or m: its connectors are where forward kinematics puts them.
     pub joints: Option<Vec<f64>>,
+    /// The recent motion of these joints, and the reference that they follow.
+    pub(crate) motion: MotionState,
     /// The planned path that it follows after local rules came no nearer to the target.
     pub(crate) plan: Option<MotionPlan<D>>,
     /// The nearest lost connectors below and above each connector, as its agent knows; empty while none is lost.
@@ -112,6 +115,7 @@ impl<const D: usize> ChainBodyState<D> {
             motions: Vec::new(),
             external: ExternalControlState::default(),
             joints: spec.arm.as_ref().map(|arm| arm.values.clone()),
+            motion: MotionState::default(),
             plan: None,
             missing: Vec::new(),
             submitted: None,

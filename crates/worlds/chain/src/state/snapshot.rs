@@ -16,6 +16,7 @@ use crate::metrics::ChainTally;
 use crate::motion::escape::EscapePlan;
 use crate::world::ChainSpec;
 use serde::{Deserialize, Serialize};
+use sidestep_arms::motion::MotionState;
 use sidestep_kernel::checkpoint::CheckpointError;
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::{Cycle, Digest, EntityId};
@@ -76,6 +77,8 @@ pub struct Snapshot {
     pub chains: Vec<ChainRecord>,
     /// Joint values of arms.
     pub(crate) joints: SnapshotComponentRecords<Vec<f64>>,
+    /// Recent motions of joints that do not rest: see [`MotionState::to_rows`].
+    pub(crate) motions: SnapshotComponentRecords<Vec<Vec<f64>>>,
     /// Plans: the postures still to be reached, each coordinate after coordinate, or of an arm joint after joint.
     pub(crate) plans: SnapshotComponentRecords<Vec<Vec<f64>>>,
     /// Plans to leave obstacles that caught a part of a chain.
@@ -109,6 +112,24 @@ impl SnapshotComponent for Option<Vec<f64>> {
     ) -> Result<(), CheckpointError> {
         let joints = self.as_mut().filter(|joints| joints.len() == values.len());
         joints.ok_or(CheckpointError::Damaged)?.clone_from(values);
+        Ok(())
+    }
+}
+
+impl SnapshotComponent for MotionState {
+    type Record = Vec<Vec<f64>>;
+
+    fn save(&self, _: Cycle) -> Option<Vec<Vec<f64>>> {
+        (!self.is_at_rest()).then(|| self.to_rows())
+    }
+
+    fn restore(
+        &mut self,
+        rows: &Vec<Vec<f64>>,
+        owner: &ExpectedChainSizes,
+    ) -> Result<(), CheckpointError> {
+        let motion = owner.joints.and_then(|joints| Self::from_rows(rows, joints));
+        *self = motion.ok_or(CheckpointError::Damaged)?;
         Ok(())
     }
 }
@@ -339,6 +360,7 @@ impl Snapshot {
     ) -> Result<(), CheckpointError> {
         let cycle = self.cycle;
         restore_component(bodies, cycle, &self.joints, |body| &mut body.joints)?;
+        restore_component(bodies, cycle, &self.motions, |body| &mut body.motion)?;
         restore_component(bodies, cycle, &self.plans, |body| &mut body.plan)?;
         restore_component(bodies, cycle, &self.escape_plans, |body| &mut body.escape_plan)?;
         restore_component(bodies, cycle, &self.standstills, |body| &mut body.standstill)?;
@@ -355,6 +377,7 @@ impl Snapshot {
         add(&mut hasher, &(self.cycle, &self.chains));
         // Empty lists add nothing, so that a new component does not change the digests of worlds without it.
         hash_nonempty_list(&mut hasher, &self.joints);
+        hash_nonempty_list(&mut hasher, &self.motions);
         hash_nonempty_list(&mut hasher, &self.plans);
         hash_nonempty_list(&mut hasher, &self.escape_plans);
         hash_nonempty_list(&mut hasher, &self.standstills);

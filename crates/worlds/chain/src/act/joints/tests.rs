@@ -35,14 +35,26 @@ fn joints(run: &ChainRun<3>) -> Vec<f64> {
 /// Advances a run to its end; `case` names it where a joint breaks a law.
 fn assert_joints_keep_their_laws(run: &mut ChainRun<3>, most: u64, case: &str) {
     let arm = run.world().chains[0].arm.clone().expect("an arm");
+    let dt_s = run.world().dt_s;
     let mut before = joints(run);
+    // Speed and acceleration of each joint in the cycle before: it starts at rest.
+    let mut rates = vec![[0.0; 2]; before.len()];
     while run.cycle() < most && !run.is_over() {
         run.advance(1);
         let now = joints(run);
         assert!(arm.serial.outside_limits(&now).is_empty(), "{case}: {now:?}");
-        for ((a, b), speed) in before.iter().zip(&now).zip(arm.follower.max_speeds()) {
-            let most = speed * run.world().dt_s * (1.0 + 1e-9);
-            assert!((b - a).abs() <= most, "{case}: {} in cycle {}", b - a, run.cycle());
+        for (i, limits) in arm.motion.rates().iter().enumerate() {
+            let speed = (now[i] - before[i]) / dt_s;
+            let acceleration = (speed - rates[i][0]) / dt_s;
+            let jerk = (acceleration - rates[i][1]) / dt_s;
+            rates[i] = [speed, acceleration];
+            let cycle = run.cycle();
+            assert!(speed.abs() <= limits.speed, "{case}: {speed} in cycle {cycle}");
+            assert!(
+                acceleration.abs() <= limits.acceleration,
+                "{case}: {acceleration} in cycle {cycle}"
+            );
+            assert!(jerk.abs() <= limits.jerk, "{case}: {jerk} in cycle {cycle}");
         }
         let places = arm.connector_positions::<3>(&now);
         assert_eq!(places, run.state().body(0).chain.points(), "{case}");
@@ -66,6 +78,9 @@ fn the_shipped_arm_visits_its_places_inside_the_limits_and_speeds_of_its_joints(
     let metrics = run.world().chain_metrics(run.state(), 0);
     assert_eq!(metrics.tally.penetrations, 0);
     assert_eq!(metrics.joints.expect("told").len(), 7);
+    assert_eq!(metrics.joint_limits.expect("told").len(), 7);
+    // The last target is where the arm rests, as drivers of arms want their trajectories to end.
+    assert!(run.state().body(0).motion.is_at_rest());
 }
 
 /// Returns places of the tool at joint values at random.
@@ -100,6 +115,46 @@ fn arms_of_others_reach_what_their_joints_reach() {
         assert_joints_keep_their_laws(&mut run, 20_000, model);
         assert_all_is_reached(&run, model);
     }
+}
+
+/// A file of limits that a joint of the shipped arm has, and keys for all of them.
+#[test]
+fn an_arm_keeps_to_the_limits_of_a_file_and_of_keys() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("joint_limits.yaml");
+    let text = "joint_limits:\n  turn_1:\n    has_acceleration_limits: true\n    max_acceleration: 0.8\n    \
+                has_jerk_limits: true\n    max_jerk: 6.0\n";
+    std::fs::write(&file, text).expect("written");
+    let keys = format!(
+        "{}, joint_limits = {:?}, max_velocity = 0.7, max_acceleration = 3",
+        shipped(),
+        file.display().to_string()
+    );
+    let task = "kind = \"targets\"\nconnector = 3\ntargets_m = [[0.4, 0.3, 0.6], [0.4, -0.3, 0.6]]";
+    let mut run = arm(&keys, "[chain]\ndimensions = 3", task);
+    let rates = run.world().chains[0].arm.clone().expect("an arm").motion.rates().to_vec();
+    assert_eq!([rates[0].speed, rates[0].acceleration, rates[0].jerk], [0.7, 0.8, 6.0]);
+    assert_eq!([rates[1].speed, rates[1].acceleration], [0.7, 3.0]);
+    assert_joints_keep_their_laws(&mut run, 5000, "limits");
+    assert_all_is_reached(&run, "limits");
+    // It is not slower than it has to be, either: some joint comes near its limits.
+    let peaks = run.state().body(0).tally.joint_peaks.clone();
+    assert!(peaks[0].max_acceleration > 0.5 * 0.8, "{peaks:?}");
+}
+
+#[test]
+fn an_arm_in_motion_goes_on_alike_from_a_checkpoint() {
+    let task = "kind = \"targets\"\nconnector = 3\ntargets_m = [[0.4, 0.3, 0.6]]";
+    let mut run = arm(&shipped(), "[chain]\ndimensions = 3", task);
+    run.advance(20);
+    assert!(!run.state().body(0).motion.is_at_rest());
+    let checkpoint = run.checkpoint();
+    let mut again = arm(&shipped(), "[chain]\ndimensions = 3", task);
+    again.restore(&checkpoint).expect("its own");
+    assert_eq!(run.digest(), again.digest());
+    run.advance(40);
+    again.advance(40);
+    assert_eq!(run.digest(), again.digest());
 }
 
 #[test]

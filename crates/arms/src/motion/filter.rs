@@ -1,0 +1,296 @@
+//! Reference postures, smoothed to joint values that keep to the rates of each joint.
+//!
+//! A driver of an arm accepts no step of speed or acceleration. The rules of the chain and its planner give a
+//! *reference*: a posture for each cycle, each within the speeds of the joints from the one before, which may stop
+//! or turn back at once. The joints follow it as the mean over a window of N cycles, of which the mean over M cycles
+//! is taken again:
+//!
+//! ```text
+//! u_k = (r_k + ... + r_{k-N+1}) / N          q_k = (u_k + ... + u_{k-M+1}) / M
+//! ```
+//!
+//! Differences of means are means of differences, so with time step dt
+//!
+//! ```text
+//! |q_k - q_{k-1}| / dt                       <= V               if all |r_k - r_{k-1}| <= V dt
+//! |second difference of q| / dt^2            <= A               if all |(r_k - r_{k-1}) - (r_{k-N} - r_{k-N-1})| <= A N dt^2
+//! |third difference of q| / dt^3             <= 2 A / (M dt)    always
+//! ```
+//!
+//! A reference that rests satisfies the second condition as long as V <= A N dt, so it may always stop. At constant speed
+//! from rest to rest the result is the profile of seven segments of constant jerk, sampled. All joints share the
+//! windows, so each posture is a weighted mean of recent references: inside the joints' ranges, at the reference once
+//! that has rested for N + M - 2 cycles, and near the reference's path before.
+//!
+//! Source: Biagiotti and Melchiorri, "FIR filters for online trajectory planning with time- and frequency-domain
+//! specifications", Control Engineering Practice 20, 2012.
+
+use super::rates::JointRates;
+use std::collections::VecDeque;
+
+/// Longest window in which speeds are smoothed, s: an arm follows its reference half of it later. Where a joint takes
+/// longer to reach its highest speed, its reference is slower than that.
+const MAX_SPEED_WINDOW_S: f64 = 0.5;
+/// Longest window in which accelerations are smoothed, s; with a joint that needs more, its acceleration is lower.
+const MAX_ACCELERATION_WINDOW_S: f64 = 0.25;
+/// Fraction of its rates that a joint uses: the rest is for rounding of differences, which is divided by the cube of
+/// the cycle.
+const RATE_FRACTION: f64 = 1.0 - 1e-6;
+/// Tolerance of a number of cycles: a window of exactly a number of cycles must not become one longer by rounding.
+const CYCLE_TOLERANCE: f64 = 1e-6;
+
+/// The smoothing of an arm's joints in cycles of fixed length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionFilter {
+    dt_s: f64,
+    rates: Vec<JointRates>,
+    /// The rates that references keep to, of which the jerk follows from the windows.
+    used: Vec<JointRates>,
+    /// N, in cycles.
+    speed_window: usize,
+    /// Weights of the last N + M - 1 references, the newest first; their sum is 1.
+    weights: Vec<f64>,
+}
+
+/// The recent motion of an arm's joints; empty while they rest.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MotionState {
+    /// The last references, the newest first.
+    references: VecDeque<Vec<f64>>,
+    /// Speed of each joint in the last cycle, rad/s or m/s.
+    speeds: Vec<f64>,
+    /// Acceleration of each joint between the last two cycles, rad/s2 or m/s2.
+    accelerations: Vec<f64>,
+}
+
+impl MotionFilter {
+    /// Returns the smoothing for joints with these rates, in cycles of `dt_s`.
+    pub fn new(rates: Vec<JointRates>, dt_s: f64) -> Self {
+        let longest =
+            |window_s: fn(&JointRates) -> f64| rates.iter().map(window_s).fold(0.0, f64::max);
+        let speed_s = longest(|rates| rates.speed / rates.acceleration).min(MAX_SPEED_WINDOW_S);
+        // From one acceleration to the opposite one.
+        let acceleration_s = longest(|rates| 2.0 * rates.acceleration / rates.jerk);
+        let speed_window = cycles(speed_s, dt_s);
+        let acceleration_window = cycles(acceleration_s.min(MAX_ACCELERATION_WINDOW_S), dt_s);
+        let used = rates.iter().map(|rates| {
+            let rates = rates.scaled(RATE_FRACTION);
+            let jerk_limited = 0.5 * rates.jerk * acceleration_window as f64 * dt_s;
+            let acceleration = rates.acceleration.min(jerk_limited);
+            let speed = rates.speed.min(acceleration * speed_window as f64 * dt_s);
+            JointRates { speed, acceleration, ..rates }
+        });
+        Self {
+            dt_s,
+            used: used.collect(),
+            speed_window,
+            weights: weights(speed_window, acceleration_window),
+            rates,
+        }
+    }
+
+    /// Returns the highest rates of each joint.
+    pub fn rates(&self) -> &[JointRates] {
+        &self.rates
+    }
+
+    /// Returns the highest speed at which a reference moves each joint, in rad/s or m/s; lower than its limit where the
+    /// joint would take longer than half a second to reach that.
+    pub fn reference_speeds(&self) -> impl Iterator<Item = f64> + '_ {
+        self.used.iter().map(|rates| rates.speed)
+    }
+
+    /// Returns the number of cycles after which the joints are where a reference rests.
+    pub fn delay_cycles(&self) -> usize {
+        self.weights.len() - 1
+    }
+
+    /// Returns the ranges of each joint in which the next reference has to be, within `limits`; each contains the last
+    /// reference, which is `joints` where they rest.
+    pub fn reference_ranges(
+        &self,
+        state: &MotionState,
+        joints: &[f64],
+        limits: &[[f64; 2]],
+    ) -> Vec<[f64; 2]> {
+        let mut ranges = Vec::with_capacity(joints.len());
+        for (i, (used, [lower, upper])) in self.used.iter().zip(limits).enumerate() {
+            let last = state.reference(joints)[i];
+            let leaving = state.step(self.speed_window - 1, i);
+            let turn = used.acceleration * self.speed_window as f64 * self.dt_s * self.dt_s;
+            let step = used.speed * self.dt_s;
+            // By rounding, 0 may be outside of what the window leaves.
+            let back = (leaving - turn).clamp(-step, 0.0);
+            let ahead = (leaving + turn).clamp(0.0, step);
+            ranges
+                .push([(last + back).max(*lower).min(last), (last + ahead).min(*upper).max(last)]);
+        }
+        ranges
+    }
+
+    /// Returns the fraction, at most 1, of the way from the last reference to another that the next one may take.
+    pub fn reachable_fraction(&self, state: &MotionState, joints: &[f64], to: &[f64]) -> f64 {
+        let unlimited = vec![[f64::NEG_INFINITY, f64::INFINITY]; joints.len()];
+        let ranges = self.reference_ranges(state, joints, &unlimited);
+        let last = state.reference(joints);
+        let mut fraction: f64 = 1.0;
+        for ((from, to), [lower, upper]) in last.iter().zip(to).zip(ranges) {
+            let change = to - from;
+            if change > 0.0 {
+                fraction = fraction.min((upper - from) / change);
+            } else if change < 0.0 {
+                fraction = fraction.min((lower - from) / change);
+            }
+        }
+        fraction
+    }
+
+    /// Returns the postures of the coming cycles if the reference goes to `reference` in this one and then rests; the
+    /// last is `reference` itself.
+    pub fn stop_postures(
+        &self,
+        state: &MotionState,
+        joints: &[f64],
+        reference: &[f64],
+    ) -> Vec<Vec<f64>> {
+        let mut coming = state.clone();
+        (0..self.weights.len())
+            .map(|_| {
+                coming.push(joints, reference.to_vec(), self.history_len());
+                self.smoothed(&coming)
+            })
+            .collect()
+    }
+
+    /// Advances the joints by a cycle in which the reference goes to `reference`; returns their new values, and the
+    /// magnitudes of the rates of each joint.
+    pub fn advance(
+        &self,
+        state: &mut MotionState,
+        joints: &[f64],
+        reference: &[f64],
+    ) -> (Vec<f64>, Vec<JointRates>) {
+        if state.is_at_rest() && reference == joints {
+            let still = JointRates { speed: 0.0, acceleration: 0.0, jerk: 0.0 };
+            return (joints.to_vec(), vec![still; joints.len()]);
+        }
+        state.push(joints, reference.to_vec(), self.history_len());
+        let next = self.smoothed(state);
+        let mut rates = Vec::with_capacity(joints.len());
+        for (i, (before, now)) in joints.iter().zip(&next).enumerate() {
+            let speed = (now - before) / self.dt_s;
+            let acceleration = (speed - state.speeds[i]) / self.dt_s;
+            let jerk = (acceleration - state.accelerations[i]) / self.dt_s;
+            rates.push(JointRates {
+                speed: speed.abs(),
+                acceleration: acceleration.abs(),
+                jerk: jerk.abs(),
+            });
+            state.speeds[i] = speed;
+            state.accelerations[i] = acceleration;
+        }
+        state.clear_if_still(&next);
+        (next, rates)
+    }
+
+    /// References that conditions or means look back to: N + 1 for the step that leaves the first window.
+    fn history_len(&self) -> usize {
+        self.weights.len().max(self.speed_window + 1)
+    }
+
+    /// Returns the weighted mean of the references. It is taken from the newest, so that it is that one exactly once all
+    /// are equal.
+    fn smoothed(&self, state: &MotionState) -> Vec<f64> {
+        let newest = &state.references[0];
+        let mut posture = newest.clone();
+        for (weight, reference) in self.weights.iter().zip(&state.references).skip(1) {
+            for ((value, old), new) in posture.iter_mut().zip(reference).zip(newest) {
+                *value += weight * (old - new);
+            }
+        }
+        posture
+    }
+}
+
+impl MotionState {
+    /// Returns whether nothing moves, nor is about to.
+    pub fn is_at_rest(&self) -> bool {
+        self.references.is_empty()
+    }
+
+    /// Returns the last reference, which is `joints` where they rest.
+    pub fn reference<'a>(&'a self, joints: &'a [f64]) -> &'a [f64] {
+        self.references.front().map_or(joints, Vec::as_slice)
+    }
+
+    /// Returns all of it as rows of one value for each joint: speeds, accelerations, and references, the newest first; none
+    /// where it is at rest.
+    pub fn to_rows(&self) -> Vec<Vec<f64>> {
+        if self.is_at_rest() {
+            return Vec::new();
+        }
+        let rates = [self.speeds.clone(), self.accelerations.clone()];
+        rates.into_iter().chain(self.references.iter().cloned()).collect()
+    }
+
+    /// Returns the state of [`MotionState::to_rows`]; none if the rows are not those of `joints` joints.
+    pub fn from_rows(rows: &[Vec<f64>], joints: usize) -> Option<Self> {
+        if rows.is_empty() {
+            return Some(Self::default());
+        }
+        let [speeds, accelerations, references @ ..] = rows else { return None };
+        if references.is_empty() || rows.iter().any(|row| row.len() != joints) {
+            return None;
+        }
+        Some(Self {
+            references: references.iter().cloned().collect(),
+            speeds: speeds.clone(),
+            accelerations: accelerations.clone(),
+        })
+    }
+
+    /// Returns by how much joint `i` of the reference moved in a cycle, that of index 0 being the last one.
+    fn step(&self, index: usize, i: usize) -> f64 {
+        match (self.references.get(index), self.references.get(index + 1)) {
+            (Some(new), Some(old)) => new[i] - old[i],
+            _ => 0.0,
+        }
+    }
+
+    /// Adds a reference, and forgets those beyond `len`. Joints at rest have been at `joints` in all cycles before.
+    fn push(&mut self, joints: &[f64], reference: Vec<f64>, len: usize) {
+        if self.is_at_rest() {
+            self.references = std::iter::repeat_n(joints.to_vec(), len).collect();
+            self.speeds = vec![0.0; joints.len()];
+            self.accelerations = vec![0.0; joints.len()];
+        }
+        self.references.push_front(reference);
+        self.references.truncate(len);
+    }
+
+    /// Forgets everything once the joints rest where all references are.
+    fn clear_if_still(&mut self, joints: &[f64]) {
+        let mut rates = self.speeds.iter().chain(&self.accelerations);
+        let mut references = self.references.iter();
+        if rates.all(|rate| *rate == 0.0) && references.all(|reference| reference == joints) {
+            *self = Self::default();
+        }
+    }
+}
+
+/// Returns the least number of cycles that are at least so long.
+fn cycles(window_s: f64, dt_s: f64) -> usize {
+    ((window_s / dt_s - CYCLE_TOLERANCE).ceil() as usize).max(1)
+}
+
+/// Returns the weights of a mean over `first` cycles of which a mean over `second` cycles is taken.
+fn weights(first: usize, second: usize) -> Vec<f64> {
+    let mut counts = vec![0_u32; first + second - 1];
+    for a in 0..first {
+        for b in 0..second {
+            counts[a + b] += 1;
+        }
+    }
+    let all = (first * second) as f64;
+    counts.into_iter().map(|count| f64::from(count) / all).collect()
+}

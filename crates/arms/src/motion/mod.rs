@@ -1,0 +1,14 @@
+//! The motion of an arm's joints in time.
+//!
+//! ```text
+//! rates   highest speed, acceleration and jerk of each joint
+//! filter  reference postures -> joint values within these rates, cycle by cycle
+//! ```
+
+mod filter;
+mod rates;
+#[cfg(test)]
+mod tests;
+
+pub use filter::{MotionFilter, MotionState};
+pub use rates::{JointRates, joint_rates};

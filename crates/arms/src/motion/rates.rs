@@ -1,0 +1,93 @@
+//! Highest speed, acceleration and jerk of each joint.
+
+use crate::kinematics::{JointMotionKind, SerialChain};
+use sidestep_import::urdf::joint_limits::{GivenRates, JointRates as RatesByName};
+use std::f64::consts::PI;
+
+/// Speeds of joints without one in the model: half a turn a second, as the joints of a UR5, and 1 m/s.
+const DEFAULT_SPEED_RAD_S: f64 = PI;
+const DEFAULT_SPEED_M_S: f64 = 1.0;
+/// Time in which a joint without a given acceleration reaches its highest speed, s. The data sheet of the Panda allows
+/// 0.10 to 0.29 s by joint; with 0.3 s each of its joints stays within it.
+const DEFAULT_SPEED_UP_S: f64 = 0.3;
+/// Time in which a joint without a given jerk reaches its highest acceleration, s. Drives of arms allow some
+/// milliseconds; this is a quarter of the period of the first resonance of arms, about 6 Hz, which a profile excites
+/// less the longer this time is.
+const DEFAULT_JERK_S: f64 = 0.04;
+
+/// The highest rates of one joint, in rad or m per s, s2 and s3.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointRates {
+    /// Highest speed.
+    pub speed: f64,
+    /// Highest acceleration.
+    pub acceleration: f64,
+    /// Highest jerk.
+    pub jerk: f64,
+}
+
+impl JointRates {
+    /// Returns the rates of a joint: those that are given, with the model's speed where none is, or else defaults; all up
+    /// to those of `at_most`.
+    fn from_given(given: GivenRates, at_most: GivenRates, motion: JointMotionKind) -> Self {
+        let default_speed = match motion {
+            JointMotionKind::Turn => DEFAULT_SPEED_RAD_S,
+            JointMotionKind::Slide => DEFAULT_SPEED_M_S,
+        };
+        let speed = lower(given.speed, at_most.speed).unwrap_or(default_speed);
+        let acceleration = lower(given.acceleration, at_most.acceleration);
+        let acceleration = acceleration.unwrap_or(speed / DEFAULT_SPEED_UP_S);
+        let jerk = lower(given.jerk, at_most.jerk).unwrap_or(acceleration / DEFAULT_JERK_S);
+        Self { speed, acceleration, jerk }
+    }
+
+    /// Returns the lower ones of two joints' rates.
+    fn min(self, other: Self) -> Self {
+        Self {
+            speed: self.speed.min(other.speed),
+            acceleration: self.acceleration.min(other.acceleration),
+            jerk: self.jerk.min(other.jerk),
+        }
+    }
+
+    pub(super) fn scaled(self, factor: f64) -> Self {
+        Self {
+            speed: self.speed * factor,
+            acceleration: self.acceleration * factor,
+            jerk: self.jerk * factor,
+        }
+    }
+}
+
+/// Returns the lower one of two limits, if there are any.
+fn lower(given: Option<f64>, at_most: Option<f64>) -> Option<f64> {
+    given.into_iter().chain(at_most).reduce(f64::min)
+}
+
+/// Returns the highest rates of each variable of an arm: `given` by the name of a joint, else of the model, else defaults; all
+/// up to those of `at_most`. Joints that mimic a variable narrow its rates.
+pub fn joint_rates(
+    chain: &SerialChain,
+    given: &RatesByName,
+    at_most: GivenRates,
+) -> Vec<JointRates> {
+    let given_rates = |name: &str, model_speed: Option<f64>| {
+        let rates = given.get(name).copied().unwrap_or_default();
+        GivenRates { speed: rates.speed.or(model_speed), ..rates }
+    };
+    let own = chain
+        .variables
+        .iter()
+        .map(|v| JointRates::from_given(given_rates(&v.name, v.max_speed), at_most, v.motion));
+    let mut rates: Vec<JointRates> = own.collect();
+    for joint in &chain.joints {
+        let multiplier = joint.drive.multiplier;
+        if multiplier != 0.0 {
+            let named = given_rates(&joint.name, joint.max_speed);
+            let own = JointRates::from_given(named, at_most, joint.motion);
+            let variable = &mut rates[joint.drive.variable];
+            *variable = variable.min(own.scaled(1.0 / multiplier.abs()));
+        }
+    }
+    rates
+}

@@ -1,0 +1,123 @@
+//! Filtered motions against closed forms and against the rates themselves.
+
+use super::*;
+use proptest::prelude::*;
+
+fn rates(speed: f64, acceleration: f64, jerk: f64) -> JointRates {
+    JointRates { speed, acceleration, jerk }
+}
+
+/// The position at time `t` of a motion from rest to rest by seven segments of constant jerk: in closed form, with the
+/// durations of its acceleration (`ramp`), of its changes of acceleration (`jerk_s`) and of its start to the start of its
+/// braking (`cruise`).
+fn seven_segments(speed: f64, [ramp, jerk_s, cruise]: [f64; 3], t: f64) -> f64 {
+    let jerk = speed / (ramp * jerk_s);
+    let cube = |from: f64| (t - from).max(0.0).powi(3) / 6.0;
+    let mut position = 0.0;
+    for (from, sign) in [(0.0, 1.0), (jerk_s, -1.0), (ramp, -1.0), (ramp + jerk_s, 1.0)] {
+        position += sign * jerk * (cube(from) - cube(from + cruise));
+    }
+    position
+}
+
+/// Leads one joint at the highest speed from 0 to `to`, and until it rests.
+fn lead(filter: &MotionFilter, to: f64) -> Vec<f64> {
+    let mut state = MotionState::default();
+    let mut joints = vec![0.0];
+    let mut positions = Vec::new();
+    let unlimited = [[f64::NEG_INFINITY, f64::INFINITY]];
+    loop {
+        let [lower, upper] = filter.reference_ranges(&state, &joints, &unlimited)[0];
+        (joints, _) = filter.advance(&mut state, &joints, &[to.clamp(lower, upper)]);
+        if state.is_at_rest() {
+            return positions;
+        }
+        positions.push(joints[0]);
+    }
+}
+
+#[test]
+fn a_motion_from_rest_to_rest_has_seven_segments() {
+    let dt_s = 1e-3;
+    let filter = MotionFilter::new(vec![rates(1.0, 4.0, 100.0)], dt_s);
+    // 1.0 / 4.0 s, 2 * 4.0 / 100.0 s, and 1.5 rad at 1 rad/s.
+    let times_s = [0.25, 0.08, 1.5];
+    let positions = lead(&filter, 1.5);
+    for (k, position) in positions.iter().enumerate() {
+        // Three sums, one for each order of a difference, are together a cycle ahead of the three integrals.
+        let expected = seven_segments(1.0, times_s, (k + 2) as f64 * dt_s);
+        assert!((position - expected).abs() < 3e-6, "{k}: {position} {expected}");
+    }
+    let lasts_s = positions.len() as f64 * dt_s;
+    assert!((lasts_s - 1.83).abs() < 4.0 * dt_s, "{lasts_s}");
+    assert_eq!(positions.last(), Some(&1.5));
+}
+
+#[test]
+fn without_a_jerk_limit_the_profile_is_a_trapezoid() {
+    let dt_s = 1e-3;
+    let filter = MotionFilter::new(vec![rates(0.5, 2.0, 1e9)], dt_s);
+    for (k, position) in lead(&filter, 1.0).into_iter().enumerate() {
+        let t = (k + 1) as f64 * dt_s;
+        // 0.5 rad/s after 0.25 s, braking from 2 s on.
+        let [up, down] = [0.0, 2.0].map(|from: f64| {
+            let ramp = (t - from).clamp(0.0, 0.25);
+            0.5 * 2.0 * ramp * ramp + 0.5 * (t - from - 0.25).max(0.0)
+        });
+        // The sampled mean is half a cycle ahead of the continuous one.
+        assert!((position - (up - down)).abs() < 0.6 * 0.5 * dt_s, "{k}: {position}");
+    }
+}
+
+#[test]
+fn a_slow_drive_is_led_more_slowly_instead_of_late() {
+    let filter = MotionFilter::new(vec![rates(2.0, 0.5, 1e9)], 0.02);
+    let speeds: Vec<f64> = filter.reference_speeds().collect();
+    assert!((speeds[0] - 0.25).abs() < 1e-5, "{speeds:?}");
+    assert_eq!(filter.delay_cycles(), 24);
+}
+
+#[test]
+fn states_survive_their_rows() {
+    let filter = MotionFilter::new(vec![rates(1.0, 4.0, 100.0); 2], 0.01);
+    let mut state = MotionState::default();
+    assert_eq!(MotionState::from_rows(&state.to_rows(), 2), Some(MotionState::default()));
+    filter.advance(&mut state, &[0.0, 1.0], &[0.004, 1.0]);
+    assert_eq!(MotionState::from_rows(&state.to_rows(), 2), Some(state.clone()));
+    assert_eq!(MotionState::from_rows(&state.to_rows(), 3), None);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    /// References that go anywhere in their ranges, and turn back at random.
+    #[test]
+    fn no_joint_exceeds_its_rates_whatever_its_reference_does(
+        limits in (0.1..4.0, 0.5..40.0, 5.0..5000.0),
+        dt_s in 0.001..0.05,
+        ways in prop::collection::vec(-1.0_f64..1.0, 1..120),
+    ) {
+        let (speed, acceleration, jerk) = limits;
+        let allowed = rates(speed, acceleration, jerk);
+        let filter = MotionFilter::new(vec![allowed], dt_s);
+        let mut state = MotionState::default();
+        let mut joints = vec![0.3];
+        let range = [[-0.5, 0.5]];
+        for way in ways {
+            let [lower, upper] = filter.reference_ranges(&state, &joints, &range)[0];
+            let last = state.reference(&joints)[0];
+            prop_assert!((lower..=upper).contains(&last));
+            // Most of them at the ends of the range.
+            let share: f64 = (2.0 * way).clamp(-1.0, 1.0);
+            let to = if share > 0.0 { last + share * (upper - last) } else { last - share * (lower - last) };
+            let stops = filter.stop_postures(&state, &joints, &[to]);
+            prop_assert_eq!(&stops[stops.len() - 1], &vec![to]);
+            let (next, used) = filter.advance(&mut state, &joints, &[to]);
+            prop_assert_eq!(&next, &stops[0]);
+            prop_assert!(used[0].speed <= speed && used[0].acceleration <= acceleration && used[0].jerk <= jerk,
+                "{:?} beyond {:?}", used[0], allowed);
+            prop_assert!(next[0].abs() <= 0.5 + 1e-12);
+            joints = next;
+        }
+    }
+}

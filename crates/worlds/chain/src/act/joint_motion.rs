@@ -1,0 +1,109 @@
+//! The joints of an arm in time. While a chain acts, an arm stands at its *reference*: where the rules of the chain and
+//! its planner have led it. At the end of each cycle the joints follow the reference within their speeds, accelerations
+//! and jerks, and the chain stands where they are.
+//!
+//! The reference moves only to where the joints can stop: every posture of the cycles in which they would come to rest
+//! there is checked as a posture of a plan is. So a reference that is vetoed may always rest. Obstacles that move, and
+//! escapes from them, do not wait for that.
+
+use super::ChainContext;
+use crate::scratch::PositionBuffer;
+use crate::state::ChainBodyState;
+use sidestep_arms::Arm;
+use sidestep_arms::motion::MotionState;
+use sidestep_arms::plan::{JointPosture, JointSpace};
+use sidestep_rods::geometry::Point;
+use sidestep_rods::{Chain, Veto, VetoReason, find_tunneling};
+
+/// Puts an arm at its reference; returns where its joints are. Nothing happens to other chains.
+pub(super) fn start_cycle<const D: usize>(
+    context: ChainContext<'_, D>,
+    body: &mut ChainBodyState<D>,
+) -> Option<Vec<f64>> {
+    let arm = context.spec.arm.as_deref()?;
+    let joints = body.joints.as_mut()?;
+    let reference = body.motion.reference(joints).to_vec();
+    let actual = std::mem::replace(joints, reference);
+    // At rest the chain is at the reference already.
+    if !body.motion.is_at_rest() {
+        let points: Vec<Point<D>> = arm.connector_positions(joints);
+        body.chain.points_mut().copy_from_slice(&points);
+    }
+    Some(actual)
+}
+
+/// Lets the joints follow the reference for a cycle from where they were, and puts the chain where they are.
+pub(super) fn finish_cycle<const D: usize>(
+    context: ChainContext<'_, D>,
+    body: &mut ChainBodyState<D>,
+    actual: Option<Vec<f64>>,
+) {
+    let (Some(arm), Some(actual)) = (context.spec.arm.as_deref(), actual) else { return };
+    let Some(reference) = body.joints.take() else { return };
+    let (next, rates) = arm.motion.advance(&mut body.motion, &actual, &reference);
+    body.tally.add_joint_rates(&rates);
+    if next != reference {
+        let points: Vec<Point<D>> = arm.connector_positions(&next);
+        body.chain.points_mut().copy_from_slice(&points);
+    }
+    body.joints = Some(next);
+}
+
+/// Returns whether a chain's connector is where it is led to be: of an arm the joints follow its reference, and have to
+/// be there as well. `actual` are the positions before this cycle.
+pub(super) fn has_followed<const D: usize>(
+    body: &ChainBodyState<D>,
+    actual: &PositionBuffer<D>,
+    arrival: impl Fn(Point<D>) -> bool,
+    k: usize,
+) -> bool {
+    body.motion.is_at_rest() || actual.points.get(k).is_none_or(|at| arrival(*at))
+}
+
+/// The check of the cycles in which joints come to rest.
+pub(super) struct StopCheck<'a, const D: usize> {
+    pub(super) context: ChainContext<'a, D>,
+    pub(super) arm: &'a Arm,
+    /// The arm's chain at its reference.
+    pub(super) chain: &'a Chain<D>,
+    /// The connector that leads.
+    pub(super) k: usize,
+}
+
+impl<const D: usize> StopCheck<'_, D> {
+    /// Returns the first veto of the postures in which the joints come to rest at `reference`, or of tunneling between
+    /// two of them; `joints` are the last reference.
+    pub(super) fn find_veto(
+        &self,
+        motion: &MotionState,
+        joints: &[f64],
+        reference: &[f64],
+    ) -> Option<Veto<D>> {
+        let ChainContext { world, obstacles, .. } = self.context;
+        let present = JointPosture { arm: self.arm, joints };
+        let is_solid = world.rules.self_collision;
+        let space = JointSpace::new(present, self.chain, obstacles, is_solid, self.k);
+        let mut moved = self.chain.clone();
+        let mut before: Option<Vec<Point<D>>> = None;
+        for posture in self.arm.motion.stop_postures(motion, joints, reference) {
+            let points: Vec<Point<D>> = self.arm.connector_positions(&posture);
+            if let Some(veto) = space.find_veto(&points) {
+                return Some(veto);
+            }
+            moved.points_mut().copy_from_slice(&points);
+            if let Some(before) = before.replace(points)
+                && let Some(tunneled) = find_tunneling(&moved, &before, obstacles, 0.0)
+            {
+                let reached = self.chain.points()[self.k];
+                return Some(Veto {
+                    by: tunneled.rod + 1,
+                    from: self.k,
+                    reason: VetoReason::WouldTunnel,
+                    obstacle: Some(tunneled.obstacle),
+                    reached,
+                });
+            }
+        }
+        None
+    }
+}
