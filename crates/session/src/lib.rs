@@ -15,6 +15,7 @@
 //! polling.rs       work that its caller polls           row_store.rs     rows that are kept in memory
 //! files.rs         files written completely or not      fleet.rs         the job of agents as processes
 //! inspect.rs       what any file is, and what becomes of it
+//! trajectory.rs    the motions of arms in a recorded run
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the
@@ -47,6 +48,7 @@ mod scenario;
 mod summary;
 #[cfg(test)]
 mod testing;
+mod trajectory;
 mod watcher;
 
 pub mod export;
@@ -75,4 +77,5 @@ pub use run_tables::{RecordedCsv, csv_table, read_summary};
 pub use scenario::{GivenScenario, problems, read_scenario};
 pub use sidestep_record::{Playback, PlaybackPhase, PlaybackRequest};
 pub use summary::{Phases, RunStatus, Summary};
+pub use trajectory::{ArmTrajectory, arm_trajectories};
 pub use watcher::{NoWatcher, Progress, Watcher};

@@ -45,3 +45,5 @@ pub use recover::{RecoverError, RecoveredJoints};
 pub use serial::{Dof, JointMotionKind, LinkFrames, SerialChain};
 pub use skeleton::{Skeleton, SkeletonRod};
 pub use transform::{Transform, Vector};
+
+pub(crate) use inverse::rotation_vector;

@@ -215,6 +215,12 @@ impl SerialChain {
         LinkFrames { tip: link.compose(&self.to_tip), links }
     }
 
+    /// Returns the same joints with a tool on the tip: its frame in that of the tip is the new tip.
+    #[must_use]
+    pub fn with_tool(self, tool: &Transform) -> Self {
+        Self { to_tip: self.to_tip.compose(tool), ..self }
+    }
+
     /// Returns the values of a named posture of `model`, by joint; joints that it leaves out are at
     /// rest. Of several values for one joint the last one holds.
     pub fn posture_values(&self, model: &Model, posture: &[(usize, f64)]) -> Vec<f64> {

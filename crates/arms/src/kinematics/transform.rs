@@ -127,6 +127,16 @@ impl Transform {
         Self { rotation, origin_m: [0.0; 3] }
     }
 
+    /// Returns the turn by the length of a vector in rad about its direction.
+    pub(crate) fn from_rotation_vector(turn: Vector) -> Self {
+        let angle_rad = norm(turn);
+        if angle_rad > 0.0 {
+            Self::from_axis_angle(scaled(turn, 1.0 / angle_rad), angle_rad)
+        } else {
+            Self::IDENTITY
+        }
+    }
+
     /// Returns a displacement without a turn.
     pub(super) fn from_translation(by_m: Vector) -> Self {
         Self { origin_m: by_m, ..Self::IDENTITY }

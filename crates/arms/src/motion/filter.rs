@@ -223,6 +223,11 @@ impl MotionState {
         self.references.front().map_or(joints, Vec::as_slice)
     }
 
+    /// Returns the oldest reference that the joints still follow, which is `joints` where they rest.
+    pub fn oldest_reference<'a>(&'a self, joints: &'a [f64]) -> &'a [f64] {
+        self.references.back().map_or(joints, Vec::as_slice)
+    }
+
     /// Returns all of it as rows of one value for each joint: speeds, accelerations, and references, the newest first; none
     /// where it is at rest.
     pub fn to_rows(&self) -> Vec<Vec<f64>> {

@@ -57,6 +57,10 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         Self { arm, present: joints, checker, k, step_m }
     }
 
+    pub(super) fn arm(&self) -> &'a Arm {
+        self.arm
+    }
+
     /// Returns the objection to the places of an arm's connectors, if there is one.
     pub fn find_veto(&self, points: &[Point<D>]) -> Option<Veto<D>> {
         self.checker.find_veto(points, self.k)

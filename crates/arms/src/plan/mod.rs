@@ -5,6 +5,7 @@
 //! space.rs:  postures of rods, the straight path between two, and whether it is free
 //! arc.rs:    straight postures and arcs, through which most paths lead
 //! joints.rs: the same for the joints of an arm
+//! goals.rs:  poses of its tool, values of its joints, and straight lines of its tool
 //! tree.rs:   two trees of postures that grow toward each other (RRT-Connect), and shortcuts
 //! ```
 //!
@@ -12,6 +13,7 @@
 //! ICRA 2000. A path of rods keeps rods, bend limits and mobilities; one of joints keeps their limits as well.
 
 mod arc;
+mod goals;
 mod joints;
 mod space;
 #[cfg(test)]
@@ -19,6 +21,7 @@ mod tests;
 mod tree;
 
 use super::ik::{ChainIkGoal, IkEngine, IkSolver};
+pub use goals::{JointGoal, plan_line, plan_to_goal};
 pub use joints::{JointPosture, JointSpace};
 use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
@@ -140,7 +143,8 @@ pub fn plan_joints<const D: usize>(
     Ok(find_path(space, Vec::new(), goals, draws))
 }
 
-/// Returns a path to one of the goals, perhaps through one of the postures on the way that are worth a try.
+/// Returns the shortened path to one of the goals, if there is any, perhaps through one of the postures on the way that are
+/// worth a try.
 fn find_path<S: ConfigurationSpace>(
     space: &S,
     vias: Vec<S::Posture>,

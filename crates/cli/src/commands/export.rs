@@ -21,6 +21,7 @@ Examples:
   sidestep export runs/office --to mcap --every 10  for Foxglove
   sidestep export runs/hall --to lorr               for PlanViz of the League
   sidestep export runs/office --to rosbag           odometry and scans for ROS 2
+  sidestep export runs/reacher --to trajectory      motions of arms: ROS 2, CSV and JSON
   sidestep export runs/office --to gif --from 1000 --until 2000
   sidestep export runs/office --to png --from 1234  one moment
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
@@ -50,6 +51,8 @@ enum ExportFormat {
     /// ROS 2 bag: odometry, true poses and scans of robots, and the map
     #[value(name = "rosbag")]
     RosBag,
+    /// Motions of the joints of arms: a ROS 2 bag with JointTrajectory and JointState, CSV and JSON
+    Trajectory,
     /// Picture of the run, or of one cycle, as SVG
     Svg,
     /// The same picture as PNG
@@ -70,6 +73,7 @@ impl ExportFormat {
             Self::Lorr => "lorr",
             Self::Mcap => "mcap",
             Self::RosBag => "rosbag",
+            Self::Trajectory => "trajectory",
             Self::Svg => "svg",
             Self::Png => "png",
             Self::Gif => "gif",
@@ -184,6 +188,7 @@ fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
         ExportFormat::Lorr => export::Format::League,
         ExportFormat::Mcap => export::Format::Mcap,
         ExportFormat::RosBag => export::Format::RosBag,
+        ExportFormat::Trajectory => export::Format::Trajectory,
         ExportFormat::Svg => export::Format::Svg,
         ExportFormat::Png => export::Format::Png { width_px: args.width },
         ExportFormat::Gif => export::Format::Gif(animation),

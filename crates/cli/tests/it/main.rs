@@ -44,4 +44,5 @@ mod support;
 mod sweep;
 mod sweep_faults;
 mod tables;
+mod trajectories;
 mod turned_maps;

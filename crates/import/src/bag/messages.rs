@@ -24,6 +24,8 @@ named! {
     PoseStamped "geometry_msgs/msg/PoseStamped" "definitions/PoseStamped.msg"
     LaserScan "sensor_msgs/msg/LaserScan" "definitions/LaserScan.msg"
     TfMessage "tf2_msgs/msg/TFMessage" "definitions/TFMessage.msg"
+    JointState "sensor_msgs/msg/JointState" "definitions/JointState.msg"
+    JointTrajectory "trajectory_msgs/msg/JointTrajectory" "definitions/JointTrajectory.msg"
 }
 
 message!(
@@ -174,6 +176,50 @@ message!(
         ranges_m: Vec<f32>,
         /// The strengths of the echoes, or nothing.
         intensities: Vec<f32>,
+    }
+);
+
+message!(
+    /// `sensor_msgs/msg/JointState`: where the joints of a robot are.
+    JointState {
+        /// The time; joints have no frame.
+        header: Header,
+        /// The names of the joints.
+        name: Vec<String>,
+        /// Their values in rad or m.
+        position: Vec<f64>,
+        /// Their speeds in rad/s or m/s.
+        velocity: Vec<f64>,
+        /// Their torques or forces, or nothing.
+        effort: Vec<f64>,
+    }
+);
+
+message!(
+    /// `trajectory_msgs/msg/JointTrajectoryPoint`: where joints are to be at a time.
+    JointTrajectoryPoint {
+        /// Values in rad or m.
+        positions: Vec<f64>,
+        /// Speeds in rad/s or m/s.
+        velocities: Vec<f64>,
+        /// Accelerations in rad/s2 or m/s2.
+        accelerations: Vec<f64>,
+        /// Torques or forces, or nothing.
+        effort: Vec<f64>,
+        /// The time since the start of the trajectory.
+        time_from_start: Time,
+    }
+);
+
+message!(
+    /// `trajectory_msgs/msg/JointTrajectory`: what a controller of an arm carries out.
+    JointTrajectory {
+        /// The time at which it starts.
+        header: Header,
+        /// The names of the joints.
+        joint_names: Vec<String>,
+        /// The points, by rising time.
+        points: Vec<JointTrajectoryPoint>,
     }
 );
 

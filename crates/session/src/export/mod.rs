@@ -6,6 +6,7 @@ mod league;
 mod pictures;
 mod tables;
 mod target;
+mod trajectory;
 
 use crate::driver::{Sinks, drive};
 use crate::frame_sink::{BagSink, EndReason, McapSink};
@@ -27,8 +28,10 @@ pub enum Format {
     League,
     /// Bodies, scans and events, for Foxglove and other viewers.
     Mcap,
-    /// ROS 2 bag: odometry, true poses and scans of robots, with the map.
+    /// ROS 2 bag: odometry, true poses and scans of robots, also of those that form a chain, with the map.
     RosBag,
+    /// Motions of the joints of arms: a ROS 2 bag with `JointTrajectory` and `JointState`, CSV and JSON.
+    Trajectory,
     /// Picture of the run, or of one cycle.
     Svg,
     /// The same picture as PNG.
@@ -115,6 +118,7 @@ pub fn export(
         Format::League => league::export(&job),
         Format::Mcap => export_mcap(&job),
         Format::RosBag => export_bag(&job),
+        Format::Trajectory => trajectory::export(&job),
         Format::Svg => pictures::export_svg(&job),
         Format::Png { width_px } => pictures::export_png(&job, *width_px),
         Format::Gif(options) => pictures::export_gif(&job, *options),

@@ -4,6 +4,7 @@ use super::FrameSink;
 use super::mcap::FRAME_OPTIONS;
 use crate::Error;
 use crate::VERSION;
+use crate::trajectory::ros_name;
 use sidestep_import::bag::cdr::encode;
 use sidestep_import::bag::messages::{
     Header, LaserScan, Message, Odometry, Pose as RosPose, PoseStamped, PoseWithCovariance,
@@ -141,12 +142,13 @@ impl FrameSink for BagSink {
     }
 
     fn capture(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
-        let frame = run.frame(FRAME_OPTIONS);
+        let mut frame = run.frame(FRAME_OPTIONS);
         if frame.odometry.is_empty() {
             let cause = format!("the world {} has no robots with odometry", run.world_name());
-            let remedy = "export a run of the world robots, or use --to mcap";
+            let remedy = "export a run of robots, or use --to mcap; of arms, use --to trajectory";
             return Err(InputError::new("--to rosbag", cause, remedy).into());
         }
+        mount_on_robots(&mut frame);
         if self.before.is_none() {
             self.write_mounts(&frame)?;
         }
@@ -155,6 +157,16 @@ impl FrameSink for BagSink {
         self.write_scans(&frame)?;
         self.before = Some((frame.time_s, frame.odometry));
         Ok(())
+    }
+}
+
+/// Names the robot that carries each scanner: in a chain of robots, scans are those of the connector that a robot keeps to.
+fn mount_on_robots(frame: &mut Frame) {
+    for scan in &mut frame.scans {
+        let [number, part] = [Some(scan.of.number), scan.of.part];
+        let mut robots = frame.odometry.iter().map(|(who, _)| *who);
+        let carrier = robots.find(|who| [Some(who.number), who.part] == [number, part]);
+        scan.of = carrier.unwrap_or(scan.of);
     }
 }
 
@@ -184,9 +196,10 @@ fn header(time_s: f64, frame_id: String) -> Header {
     Header { stamp: Time::from_ns(to_ns(time_s)), frame_id }
 }
 
-/// Returns e.g. `robot_3`: names in ROS begin with a letter and have no spaces.
+/// Returns e.g. `robot_3`, or `robot_0_3` for a part of a body: names in ROS begin with a letter and have no spaces.
 fn namespace(who: BodyId) -> String {
-    format!("{}_{}", who.kind, who.number)
+    let part = who.part.map_or(String::new(), |part| format!("_{part}"));
+    format!("{}_{}{part}", ros_name(&who.kind.to_string()), who.number)
 }
 
 fn odometry_frame(who: BodyId) -> String {
@@ -199,11 +212,6 @@ fn base_frame(who: BodyId) -> String {
 
 fn scan_frame(scan: &Scan) -> String {
     format!("{}/{}", namespace(scan.of), ros_name(&scan.sensor))
-}
-
-/// Returns a name without characters that a topic may not have.
-fn ros_name(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
 
 fn ros_pose(pose: &Pose) -> RosPose {

@@ -12,6 +12,7 @@ use super::script::{Script, ScriptMotion, Turtle};
 use super::swarm::leader::LeaderState;
 use own_driver::OwnDriver;
 use serde::{Deserialize, Serialize};
+use sidestep_arms::plan::JointGoal;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{Cycle, InputError, math};
@@ -88,6 +89,19 @@ pub(crate) struct Targets<const D: usize> {
     pub(crate) places: Vec<Point<D>>,
     /// Distance at which a place counts as reached, meters.
     pub(crate) tolerance_m: f64,
+    /// What is asked of an arm's joints at each of the places; none where these are all.
+    pub(crate) goals: Vec<JointGoal>,
+    /// The way from one to the next.
+    pub(crate) path: TargetPath,
+}
+
+/// The way from one target to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TargetPath {
+    /// Any: by local rules and plans.
+    Any,
+    /// A straight line of an arm's tool.
+    Line,
 }
 
 impl<const D: usize> Task<D> {

@@ -7,17 +7,22 @@ use sidestep_arms::kinematics::JointMotionKind;
 use sidestep_rods::{Mobility, RodBvh};
 use sidestep_scenario::Remark;
 
+/// Fraction of its highest speed below which a joint counts as led slowly: more than what is kept for rounding.
+const SLOW_FRACTION: f64 = 0.99;
+
 /// Returns remarks on files, then on joints, on the network, and on rules without effect.
 pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark> {
     let ground = compiled.recipe.iter().flat_map(|recipe| recipe.ground_remarks.iter().cloned());
     let mut chains = compiled.world.chains.iter().enumerate();
     let files = chains.clone().flat_map(|(k, spec)| arm_file_remarks(k, spec));
     let unlimited = chains.clone().filter_map(|(k, spec)| unlimited_speeds_remark(k, spec));
+    let led_slowly = chains.clone().filter_map(|(k, spec)| slow_joints_remark(k, spec));
     // One of them is enough: all chains talk over the same network.
     let slow = chains.find_map(|(k, spec)| slow_network_remark(&compiled.world, k, spec));
     let of_files = ground.chain(files);
     let overlap = own_overlap_remark(&compiled.world);
-    of_files.chain(unlimited).chain(slow).chain(overlap).chain(unused_rules(compiled)).collect()
+    let of_arms = unlimited.chain(led_slowly);
+    of_files.chain(of_arms).chain(slow).chain(overlap).chain(unused_rules(compiled)).collect()
 }
 
 /// Returns a warning on chains whose own parts overlap at the start, where that is allowed.
@@ -124,6 +129,32 @@ fn unlimited_speeds_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Opt
         "the model gives no velocity for some joints, which are taken to reach: {}; write \
          <limit velocity=\"...\"/> for others",
         taken.join(", ")
+    );
+    Some(Remark::note(format!("chains.{k}.arm"), words))
+}
+
+/// Returns a note on joints that are led more slowly than they may move, because they would take long to stop.
+fn slow_joints_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
+    let arm = spec.arm.as_deref()?;
+    let motion = &arm.motion;
+    let mut slow = Vec::new();
+    for ((joint, rates), speed) in
+        arm.serial.variables.iter().zip(motion.rates()).zip(motion.reference_speeds())
+    {
+        if speed < SLOW_FRACTION * rates.speed {
+            let unit = if joint.motion == JointMotionKind::Turn { "rad/s" } else { "m/s" };
+            let limit = rates.speed;
+            slow.push(format!("`{}` at up to {speed:.4} {unit} of {limit:.4}", joint.name));
+        }
+    }
+    if slow.is_empty() {
+        return None;
+    }
+    let words = format!(
+        "some joints need longer than 0.5 s to reach their highest speed, or 0.25 s to reverse their highest \
+         acceleration, and are led more slowly: {}; a higher max_acceleration or max_jerk in joint_limits makes them \
+         faster",
+        slow.join(", ")
     );
     Some(Remark::note(format!("chains.{k}.arm"), words))
 }

@@ -10,6 +10,7 @@ use sidestep_kernel::ports::{Table, TableBuffer, TableBuffers, TableRowsBuffer};
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_rods::VetoReason;
 use sidestep_rods::geometry::{ConvexCore, Point, convert_dimensions};
+use std::collections::BTreeMap;
 
 /// Position of a connector, a robot or an obstacle at the start of a cycle.
 #[derive(Debug)]
@@ -28,7 +29,38 @@ struct JointRow {
     cycle: Cycle,
     chain: EntityId,
     joint: u32,
+    /// Index of its name.
+    name: u32,
     value: f64,
+}
+
+/// The names of the joints of all arms.
+#[derive(Debug, Default)]
+struct JointNames {
+    /// Each name once, in the order of the chains.
+    names: Vec<String>,
+    /// Index of the name of each joint of each chain; none of chains that are no arms.
+    of_chains: Vec<Vec<u32>>,
+}
+
+impl JointNames {
+    fn from_world<const D: usize>(world: &ChainWorld<D>) -> Self {
+        let mut all = Self::default();
+        let mut indices = BTreeMap::new();
+        for spec in world.chains.iter() {
+            let variables = spec.arm.iter().flat_map(|arm| &arm.serial.variables);
+            let mut of_chain = Vec::new();
+            for variable in variables {
+                let index = *indices.entry(variable.name.clone()).or_insert_with(|| {
+                    all.names.push(variable.name.clone());
+                    all.names.len() as u32 - 1
+                });
+                of_chain.push(index);
+            }
+            all.of_chains.push(of_chain);
+        }
+        all
+    }
 }
 
 /// Adds as many columns as there are dimensions, from x on.
@@ -60,11 +92,12 @@ fn robots_table() -> Table<PositionRow> {
         .f64("heading_rad", "heading, counterclockwise from east", |p| p.at[2])
 }
 
-fn joints_table() -> Table<JointRow> {
+fn joints_table(names: Vec<String>) -> Table<JointRow> {
     Table::new("joints")
         .u64("cycle", "cycle of dt at whose start this holds", |j: &JointRow| j.cycle)
         .u32("chain", "entity id", |j| j.chain)
         .u32("joint", "its number among the arm's variables, from base to tip", |j| j.joint)
+        .label("name", "its name in the model", names, |j| j.name)
         .f64("value", "rad, or m where it slides", |j| j.value)
 }
 
@@ -98,6 +131,7 @@ pub(super) struct RecordBuffers {
     record: RecordSection,
     trajectories: TableRowsBuffer<PositionRow>,
     joints: TableRowsBuffer<JointRow>,
+    joint_names: JointNames,
     robots: TableRowsBuffer<PositionRow>,
     movers: TableRowsBuffer<PositionRow>,
     events: TableRowsBuffer<Event>,
@@ -125,7 +159,9 @@ impl RecordBuffers {
         let has_arms = world.chains.iter().any(|spec| spec.arm.is_some());
         let has_movers = !world.movers.is_empty();
         self.trajectories.set_table(record.trajectories.then(|| trajectories_table(D)));
-        self.joints.set_table((record.joints && has_arms).then(joints_table));
+        self.joint_names = JointNames::from_world(world);
+        let names = self.joint_names.names.clone();
+        self.joints.set_table((record.joints && has_arms).then(|| joints_table(names)));
         self.robots.set_table((record.robots && world.has_robots()).then(robots_table));
         self.movers.set_table((record.movers && has_movers).then(|| movers_table(D)));
         self.events.set_table(record.events.then(events_table));
@@ -156,8 +192,10 @@ impl RecordBuffers {
             for slot in 0..state.len() {
                 let body = state.body(slot);
                 let chain = slot as EntityId;
-                for (joint, &value) in (0..).zip(body.joints.iter().flatten()) {
-                    self.joints.push(JointRow { cycle: now, chain, joint, value });
+                let names = self.joint_names.of_chains[slot].iter();
+                let values = body.joints.iter().flatten().zip(names);
+                for (joint, (&value, &name)) in (0..).zip(values) {
+                    self.joints.push(JointRow { cycle: now, chain, joint, name, value });
                 }
             }
         }

@@ -4,6 +4,7 @@ mod arms;
 mod chains;
 mod changes;
 mod deployment;
+mod joint_goals;
 mod leader;
 mod mobility;
 mod navigators;

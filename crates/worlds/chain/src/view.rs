@@ -1,6 +1,6 @@
 //! The visible parts of chains: connectors and rods, robots on wheels, and obstacles.
 
-use super::driver::{Task, TaskKind};
+use super::driver::{Task, TaskKind, TaskProgress};
 use super::events::{Event, EventKind};
 use super::navigate::NavigationGoal;
 use super::perceive::Perceiver;
@@ -8,9 +8,10 @@ use super::scratch::Scratch;
 use super::state::{ChainBodyState as ChainBody, ChainWorldState};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use crate::kinds;
+use sidestep_kernel::math::wrap_angle;
 use sidestep_kernel::view::{
-    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, LogEvent, Pose, PositionTableColumns,
-    Quantity, Scan, ScanSelection, Scenery, Severity, Shape, Vec3,
+    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, Isometry2, LogEvent, Pose,
+    PositionTableColumns, Quantity, Scan, ScanSelection, Scenery, Severity, Shape, Vec3,
 };
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 use sidestep_rods::geometry::{ConvexCore, Cuboid, convert_dimensions, cross};
@@ -76,6 +77,32 @@ impl<const D: usize> ChainWorld<D> {
             self.movers.at(self.cycle_start_time_s(now)).map(|mover| obstacle_body(&mover)),
         );
         bodies
+    }
+
+    /// Returns the poses of robots relative to those at the start of the run, if they are asked for: wheels here do not
+    /// slip, so odometry is exact.
+    pub(crate) fn odometry_poses(
+        &self,
+        state: &ChainWorldState<D>,
+        is_enabled: bool,
+    ) -> Vec<(BodyId, Pose)> {
+        let mut poses = Vec::new();
+        if !is_enabled {
+            return poses;
+        }
+        for (id, spec) in (0..).zip(self.chains.iter()) {
+            let start = TaskProgress::new(spec.tasks[0].agent, spec.start.points());
+            let starts = spec.place_robots_at_connectors(spec.start.points(), &start);
+            let body = state.body(id as usize);
+            for ((part, robot), start) in (0..).zip(&body.robots).zip(&starts) {
+                let origin = Isometry2 { origin_m: start.pose.at, yaw_rad: start.pose.heading_rad };
+                let [x_m, y_m] = origin.inverse_transform_point(robot.pose.at);
+                let turn_rad = wrap_angle(robot.pose.heading_rad - start.pose.heading_rad);
+                let pose = Pose::from_heading([x_m, y_m, 0.0], turn_rad);
+                poses.push((BodyId::new(kinds::ROBOT, id, Some(part)), pose));
+            }
+        }
+        poses
     }
 
     /// Returns the laser scans that leaders on wheels are about to take.

@@ -77,6 +77,8 @@ pub struct Collector {
     rows: RecordBuffers,
     /// Events that wait for the next frame.
     log: EventBuffer<Event>,
+    /// Whether frames have the odometry of robots.
+    has_odometry: bool,
     /// Events of a cycle in the order of the workers, until [`World::merge_worker_results`] sorts them.
     gathered: Vec<Event>,
 }
@@ -161,6 +163,10 @@ impl<const D: usize> RecordableWorld for ChainWorld<D> {
         collector.rows.start(self);
     }
 
+    fn enable_odometry(&self, collector: &mut Collector) {
+        collector.has_odometry = true;
+    }
+
     fn enable_events(&self, collector: &mut Collector) {
         collector.log.is_enabled = true;
     }
@@ -228,7 +234,7 @@ impl<const D: usize> WorldView for ChainWorld<D> {
             time_s: self.cycle_start_time_s(now),
             bodies: self.view_bodies(state, now),
             scans: self.scans(state, now, &look.scans),
-            odometry: Vec::new(),
+            odometry: self.odometry_poses(state, collector.has_odometry),
             log: events.iter().map(view_event).collect(),
             log_left_out,
         }

@@ -63,6 +63,11 @@ impl<'a> PostureEvaluator<'a> {
         }
     }
 
+    /// Returns the length as which an angle of 1 rad counts.
+    pub(super) fn radian_m(&self) -> f64 {
+        self.radian_m
+    }
+
     /// Returns an evaluation of no posture, as a buffer for [`PostureEvaluator::evaluate`].
     pub(super) fn empty_evaluation(chain: &SerialChain) -> PostureEvaluation {
         PostureEvaluation {

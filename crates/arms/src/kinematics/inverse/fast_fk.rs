@@ -158,7 +158,7 @@ fn halve_matrix(a: &[Vector; 3]) -> [Vector; 3] {
 }
 
 /// Returns the rotation by which `from` becomes `to`, as its axis times its angle in rad.
-pub(super) fn rotation_between(from: &[Vector; 3], to: &[Vector; 3]) -> Vector {
+pub(crate) fn rotation_between(from: &[Vector; 3], to: &[Vector; 3]) -> Vector {
     // `to * from^T`.
     let r = to.map(|row| from.map(|other| dot(row, other)));
     let skew = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]];

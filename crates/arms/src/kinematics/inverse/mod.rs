@@ -13,7 +13,8 @@
 //! criteria   errors of a posture and their Jacobian: the tip, its orientation, contacts
 //! step       a damped step inside limits
 //! descent    steps from one posture, until the goal is met or nothing is gained
-//! search     descents from many postures, and the reason if none leads there
+//! search     descents from many postures
+//! failure    the reason if none leads there
 //! solutions  several postures, and those nearest to the start
 //! guide      the connectors' solution as a posture to start from
 //! tracking   joint values for the places of all connectors, within one cycle
@@ -24,6 +25,7 @@
 mod contacts;
 mod criteria;
 mod descent;
+mod failure;
 mod fast_fk;
 mod goal;
 mod guide;
@@ -39,7 +41,10 @@ pub use goal::{ArmGoal, FrameAxis, MAX_SOLUTIONS, ObstacleSphere, OrientationMas
 pub use result::{ArmBodyPart, CollidesWith, Collision, IkFailure, IkResult, IkSolution};
 pub use tracking::{ConnectorTarget, ConnectorTargetSolver};
 
+pub(crate) use fast_fk::rotation_between as rotation_vector;
+
 use super::serial::SerialChain;
+use criteria::PostureEvaluator;
 use search::IkSearch;
 use sidestep_kernel::InputError;
 
@@ -55,5 +60,12 @@ impl SerialChain {
         self.check_joint_values("start", start)?;
         let skeleton = self.skeleton();
         Ok(IkSearch::new(self, &skeleton, goal).run(start))
+    }
+
+    /// Returns the distance of the tip at these values from the goal's target in m, and the angle from its orientation in
+    /// rad, of the parts that count.
+    pub fn pose_error(&self, goal: &ArmGoal, values: &[f64]) -> (f64, f64) {
+        let tip = self.forward_kinematics(values).tip;
+        PostureEvaluator::new(self, &self.skeleton(), goal).tip_errors(&tip)
     }
 }

@@ -75,7 +75,7 @@ pub enum CollidesWith {
     Link(String),
 }
 
-/// Why a goal is not met: the reason that helps most, of those that hold.
+/// Why a goal is not met: of the constraints without which it would be, the nearest to being kept.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum IkFailure {
     /// The rods are too short.
@@ -99,9 +99,13 @@ pub enum IkFailure {
         hole_m: f64,
     },
     /// The target can be reached, but only with a joint outside its limits.
-    #[error("joint `{joint}` would have to be at {value:.6}, outside {lower:.6} to {upper:.6}")]
+    #[error(
+        "joint `{joint}` would have to be at {value:.6}, outside {lower:.6} to {upper:.6}; within the limits the nearest \
+         posture found is {}",
+        off(*error_m, *error_rad)
+    )]
     OutsideLimits {
-        /// The first such joint from the base.
+        /// The joint that is the farthest outside, where all joints leave their limits as little as the target allows.
         joint: String,
         /// Its value in rad or m.
         value: f64,
@@ -109,20 +113,22 @@ pub enum IkFailure {
         lower: f64,
         /// Highest value allowed.
         upper: f64,
+        /// Distance of the tip from the target within the limits, in m.
+        error_m: f64,
+        /// Angle from the orientation asked, in rad; 0 if none counts.
+        error_rad: f64,
     },
     /// The target can be reached, but only with a part in a sphere or in another part.
     #[error("{0}")]
     Blocked(Collision),
     /// The tip gets to the target, but no posture was found in which it is turned as asked.
     #[error(
-        "the tip can get there, but not turned as asked: the best of {starts} starts is {error_m:.6} m and {error_rad:.6} rad off"
+        "the tip can get there, but not turned as asked: the best of {starts} starts is {error_rad:.6} rad off there"
     )]
     NotTurned {
         /// Postures that the search started from.
         starts: usize,
-        /// Distance of the best from the target in m.
-        error_m: f64,
-        /// Its angle from the orientation asked, in rad.
+        /// The least angle from the orientation asked with the tip at the target, in rad.
         error_rad: f64,
     },
     /// No start led to the target.
@@ -133,4 +139,13 @@ pub enum IkFailure {
         /// Distance of the nearest from the target in m.
         error_m: f64,
     },
+}
+
+/// Returns how far a posture is off, with the angle if one counts.
+fn off(error_m: f64, error_rad: f64) -> String {
+    if error_rad > 0.0 {
+        format!("{error_m:.6} m and {error_rad:.6} rad off")
+    } else {
+        format!("{error_m:.6} m off")
+    }
 }

@@ -4,9 +4,9 @@ use super::super::serial::{JointMotionKind, SerialChain};
 use super::super::skeleton::Skeleton;
 use super::criteria::PostureEvaluator;
 use super::descent::{Descender, DescentLimits, DescentResult};
-use super::goal::{ArmGoal, ObstacleSphere, OrientationMask, PoseMask};
+use super::goal::ArmGoal;
 use super::guide;
-use super::result::{Collision, IkFailure, IkResult, IkSolution};
+use super::result::{IkFailure, IkResult, IkSolution};
 use super::step::{IkStepper, JointRanges};
 use crate::ik::IkEngine;
 use sidestep_kernel::Seed;
@@ -17,19 +17,20 @@ use std::f64::consts::PI;
 /// A stream of its own, so that no other draw shifts these.
 const START: Purpose = Purpose(0x1D);
 /// Restarts if no answer can be expected, to come near or to find the reason.
-const FEW_RESTARTS: usize = 8;
+pub(super) const FEW_RESTARTS: usize = 8;
 
 pub(super) struct IkSearch<'a> {
     pub(super) skeleton: &'a Skeleton,
     pub(super) by: Descender<'a>,
 }
 
-struct BestDescent {
-    descent: DescentResult,
+/// The best of several descents.
+pub(super) struct BestDescent {
+    pub(super) descent: DescentResult,
     /// Steps of all descents, also of those that were not kept.
     steps: usize,
-    starts: usize,
-    is_met: bool,
+    pub(super) starts: usize,
+    pub(super) is_met: bool,
 }
 
 /// The postures that were found, the nearest to the start first, and the effort.
@@ -81,7 +82,7 @@ impl<'a> IkSearch<'a> {
 
     /// Descends from `first` and then from random postures, until the goal is met; in the end from
     /// the best of all, patiently.
-    fn find_best(&mut self, first: Vec<f64>, restarts: usize) -> BestDescent {
+    pub(super) fn find_best(&mut self, first: Vec<f64>, restarts: usize) -> BestDescent {
         let mut descent = self.by.descend(first, DescentLimits::BRIEF);
         let mut steps = descent.steps;
         for k in 1..=restarts {
@@ -164,66 +165,6 @@ impl<'a> IkSearch<'a> {
             return Some(IkFailure::TooFar { far_m, reach_m });
         }
         (far_m < hole_m - goal.tolerance_m).then_some(IkFailure::TooNear { far_m, hole_m })
-    }
-
-    /// Returns the constraint without which there would be a solution: the goal is solved again without
-    /// each in turn, the most useful reason first.
-    fn find_failure_reason(&self, best: &BestDescent) -> IkFailure {
-        let Descender { goal, .. } = &self.by;
-        let evaluation = &best.descent.evaluation;
-        let is_there =
-            evaluation.tip_m <= goal.tolerance_m && evaluation.turn_rad <= goal.tolerance_rad;
-        if let Some(hit) = evaluation.touched.hit.clone().filter(|_| is_there) {
-            return IkFailure::Blocked(hit);
-        }
-        let few = ArmGoal { restarts: goal.restarts.min(FEW_RESTARTS), ..(*goal).clone() };
-        if let Some(reason) = self.find_limit_failure(&few, best) {
-            return reason;
-        }
-        if let Some(hit) = self.find_blocking_collision(&few, best) {
-            return IkFailure::Blocked(hit);
-        }
-        let starts = best.starts;
-        let error_m = evaluation.tip_m;
-        let error_rad = evaluation.turn_rad;
-        let unturned = PoseMask { turn: OrientationMask::Free, ..goal.asked };
-        let is_turn = goal.asked.turn != OrientationMask::Free
-            && unturned.along != [false; 3]
-            && self.solve_other_goal(&ArmGoal { asked: unturned, ..few }, best).is_some();
-        if is_turn {
-            return IkFailure::NotTurned { starts, error_m, error_rad };
-        }
-        IkFailure::NotFound { starts, error_m }
-    }
-
-    fn find_limit_failure(&self, few: &ArmGoal, best: &BestDescent) -> Option<IkFailure> {
-        if few.ignore_limits {
-            return None;
-        }
-        let values =
-            self.solve_other_goal(&ArmGoal { ignore_limits: true, ..few.clone() }, best)?;
-        let (joint, value, lower, upper) = self.by.bounds.first_outside(self.by.chain, &values)?;
-        Some(IkFailure::OutsideLimits { joint, value, lower, upper })
-    }
-
-    /// Returns the hit in a posture that would meet the goal if there were no contacts.
-    fn find_blocking_collision(&self, few: &ArmGoal, best: &BestDescent) -> Option<Collision> {
-        if few.spheres.is_empty() && !few.own_body {
-            return None;
-        }
-        let spheres: Vec<ObstacleSphere> = Vec::new();
-        let bare = ArmGoal { spheres, body: None, own_body: false, ..few.clone() };
-        let values = self.solve_other_goal(&bare, best)?;
-        let mut evaluation = PostureEvaluator::empty_evaluation(self.by.chain);
-        self.by.criteria.evaluate(&values, &mut evaluation);
-        evaluation.touched.hit
-    }
-
-    /// Returns values that meet another goal, starting from the best posture.
-    fn solve_other_goal(&self, goal: &ArmGoal, best: &BestDescent) -> Option<Vec<f64>> {
-        let mut search = IkSearch::new(self.by.chain, self.skeleton, goal);
-        let found = search.find_best(best.descent.values.clone(), goal.restarts);
-        found.is_met.then_some(found.descent.values)
     }
 }
 

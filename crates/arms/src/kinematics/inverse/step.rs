@@ -43,17 +43,6 @@ impl JointRanges {
             *value = value.min(*upper).max(*lower);
         }
     }
-
-    /// Returns the first variable outside, for reports: name, value, lowest and highest value.
-    pub(super) fn first_outside(
-        &self,
-        chain: &SerialChain,
-        values: &[f64],
-    ) -> Option<(String, f64, f64, f64)> {
-        let all = chain.variables.iter().zip(values).zip(&self.ranges);
-        all.map(|((v, &value), &[lower, upper])| (v.name.clone(), value, lower, upper))
-            .find(|(_, value, lower, upper)| value < lower || value > upper)
-    }
 }
 
 /// The matrices of a step, kept so that steps allocate nothing.

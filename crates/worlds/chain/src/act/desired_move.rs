@@ -1,23 +1,27 @@
 //! The move that a chain's driver wants in a cycle.
 
 use super::bounds::EscapeContext;
+use super::joint_goals::step_to_joint_goal;
 use super::joint_motion::has_followed;
 use super::joints::arrival_tolerance_m;
 use super::orders::motion_from_orders;
 use super::own_driver::ask_own_driver;
 use super::plan::plan_if_stuck;
+use super::tasks::{complete_target, is_last_target};
 use super::wheels::{NavigatedChain, WheelStep};
 use super::{ChainCycleState, ChainFollowMode, Initiator};
 use crate::driver::external::Orders;
 use crate::driver::own_driver::DriverAction;
 use crate::driver::step_motion::StepMotion;
 use crate::driver::{Targets, TaskKind, Wander, wander_direction};
-use crate::events::EventKind;
 use crate::script::ScriptMotion;
 use crate::state::ChainBodyState;
 use crate::swarm::leader::LeaderDecision;
 use crate::world::purpose;
 use sidestep_rods::geometry::{Point, add_scaled, convert_dimensions, distance, move_toward};
+
+/// Fraction of its step by which an arm's tool comes nearer to a target in a cycle, at least, as long as it needs no plan.
+const MIN_APPROACH_FRACTION: f64 = 0.1;
 
 /// The move that a driver wants in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,10 +139,17 @@ fn step_to_target<const D: usize>(
     let Some(&target) = targets.places.get(driving.next as usize) else {
         return DesiredMove::Done;
     };
+    if let Some(goal) = targets.goals.get(driving.next as usize) {
+        return step_to_joint_goal(initiator, acting, targets, goal);
+    }
     let left_m = distance(at, target);
+    // An arm that grazes an obstacle creeps on, because its joints must be able to stop: a plan leads it there sooner.
+    let is_arm = initiator.context.spec.arm.is_some();
+    let least_m = if is_arm { MIN_APPROACH_FRACTION * initiator.step_m() } else { 0.0 };
+    let comes_nearer = driving.nearest_m - left_m > least_m.min(left_m);
     // On a planned path a chain goes away from its target at first, and that is no time lost.
     if !is_planned {
-        driving.late = if left_m < driving.nearest_m { 0 } else { driving.late.saturating_add(1) };
+        driving.late = if comes_nearer { 0 } else { driving.late.saturating_add(1) };
     }
     driving.nearest_m = driving.nearest_m.min(left_m);
     if left_m > targets.tolerance_m {
@@ -152,25 +163,10 @@ fn step_to_target<const D: usize>(
     body.plan = None;
     let is_last = is_last_target(initiator, body, targets);
     let arrives = |at| !is_last && distance(at, target) <= targets.tolerance_m;
-    if !has_followed(body, acting.actual, arrives, initiator.task.agent) {
-        return DesiredMove::Rest;
+    if has_followed(body, acting.actual, arrives, initiator.task.agent) {
+        complete_target(initiator, acting);
     }
-    let number = f64::from(body.driving.next);
-    acting.sink.record(&body.chain, EventKind::Target, initiator.task.agent, number);
-    body.tally.done += 1;
-    body.driving.start_next_subtask();
     DesiredMove::Rest
-}
-
-/// Returns whether the present target is the last one of all tasks, at which an arm comes to rest.
-fn is_last_target<const D: usize>(
-    initiator: Initiator<'_, D>,
-    body: &ChainBodyState<D>,
-    targets: &Targets<D>,
-) -> bool {
-    let driving = &body.driving;
-    driving.task as usize + 1 == initiator.context.spec.tasks.len()
-        && driving.next as usize + 1 == targets.places.len()
 }
 
 /// Returns the next move of a script. Turning takes no time.

@@ -12,7 +12,7 @@ use crate::state::ChainBodyState;
 use sidestep_arms::Arm;
 use sidestep_arms::motion::MotionState;
 use sidestep_arms::plan::{JointPosture, JointSpace};
-use sidestep_rods::geometry::Point;
+use sidestep_rods::geometry::{Point, norm, normalized, perpendicular_component, sub};
 use sidestep_rods::{Chain, Veto, VetoReason, find_tunneling};
 
 /// Puts an arm at its reference; returns where its joints are. Nothing happens to other chains.
@@ -57,7 +57,12 @@ pub(super) fn has_followed<const D: usize>(
     arrival: impl Fn(Point<D>) -> bool,
     k: usize,
 ) -> bool {
-    body.motion.is_at_rest() || actual.points.get(k).is_none_or(|at| arrival(*at))
+    has_come_to_rest(body) || actual.points.get(k).is_none_or(|at| arrival(*at))
+}
+
+/// Returns whether the joints of an arm rest where their reference is; always of other chains.
+pub(super) fn has_come_to_rest<const D: usize>(body: &ChainBodyState<D>) -> bool {
+    body.motion.is_at_rest()
 }
 
 /// The check of the cycles in which joints come to rest.
@@ -68,6 +73,8 @@ pub(super) struct StopCheck<'a, const D: usize> {
     pub(super) chain: &'a Chain<D>,
     /// The connector that leads.
     pub(super) k: usize,
+    /// How far it may leave the straight line of its recent references, m; none where it has to follow none.
+    pub(super) line_tolerance_m: Option<f64>,
 }
 
 impl<const D: usize> StopCheck<'_, D> {
@@ -83,12 +90,21 @@ impl<const D: usize> StopCheck<'_, D> {
         let present = JointPosture { arm: self.arm, joints };
         let is_solid = world.rules.self_collision;
         let space = JointSpace::new(present, self.chain, obstacles, is_solid, self.k);
+        let line = self.line_tolerance_m.map(|tolerance_m| StraightLine {
+            ends: [motion.oldest_reference(joints), reference].map(|posture| self.tool(posture)),
+            tolerance_m,
+        });
         let mut moved = self.chain.clone();
         let mut before: Option<Vec<Point<D>>> = None;
         for posture in self.arm.motion.stop_postures(motion, joints, reference) {
             let points: Vec<Point<D>> = self.arm.connector_positions(&posture);
             if let Some(veto) = space.find_veto(&points) {
                 return Some(veto);
+            }
+            if line.as_ref().is_some_and(|line| line.is_left_at(points[self.k])) {
+                let reached = self.chain.points()[self.k];
+                let reason = VetoReason::StepLimit;
+                return Some(Veto { by: self.k, from: self.k, reason, obstacle: None, reached });
             }
             moved.points_mut().copy_from_slice(&points);
             if let Some(before) = before.replace(points)
@@ -105,5 +121,24 @@ impl<const D: usize> StopCheck<'_, D> {
             }
         }
         None
+    }
+
+    /// Returns where the connector that leads is in a posture.
+    fn tool(&self, posture: &[f64]) -> Point<D> {
+        self.arm.connector_positions(posture)[self.k]
+    }
+}
+
+/// The line that a tool follows.
+struct StraightLine<const D: usize> {
+    ends: [Point<D>; 2],
+    tolerance_m: f64,
+}
+
+impl<const D: usize> StraightLine<D> {
+    fn is_left_at(&self, at: Point<D>) -> bool {
+        let [from, to] = self.ends;
+        let along = normalized(sub(to, from)).unwrap_or([0.0; D]);
+        norm(perpendicular_component(sub(at, from), along)) > self.tolerance_m
     }
 }

@@ -269,7 +269,13 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
             return Some(veto);
         }
         let k = posed.led.first().map_or(0, |led| led.k);
-        let stop = StopCheck { context: self.context, arm: self.arm, chain: self.chain, k };
+        let stop = StopCheck {
+            context: self.context,
+            arm: self.arm,
+            chain: self.chain,
+            k,
+            line_tolerance_m: None,
+        };
         stop.find_veto(self.motion, &self.before.joints, &posed.joints)
     }
 

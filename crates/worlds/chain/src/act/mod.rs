@@ -12,6 +12,7 @@
 //! broken.rs, gather.rs -> bounds.rs (escape) -> drive.rs -> bounds.rs (back into the claim) -> orders.rs
 //!                      -> joint_motion.rs -> follow.rs -> measure.rs
 //! drive.rs     -> desired_move.rs -> wheels.rs, plan.rs, orders.rs   what the initiator wants
+//!              -> joint_goals.rs -> plan.rs                          ... of an arm's tool and joints
 //!              -> own_driver.rs                                      ... by a driver of the program's own
 //!              -> lookahead.rs                                       whether it rests instead
 //!              -> wheels.rs -> initiator.rs -> joints.rs, outcome.rs -> tasks.rs
@@ -28,6 +29,7 @@ mod event_sink;
 mod follow;
 mod gather;
 mod initiator;
+mod joint_goals;
 mod joint_motion;
 mod joints;
 mod lookahead;

@@ -2,11 +2,12 @@
 
 use super::joint_motion::StopCheck;
 use super::{ChainContext, ChainCycleState, Initiator};
-use crate::driver::Targets;
+use crate::driver::{TargetPath, Targets, TaskKind};
 use crate::events::EventKind;
 use crate::scratch::PositionBuffer;
 use crate::state::{ChainBodyState, MotionPlan};
 use crate::world::purpose;
+use sidestep_arms::Arm;
 use sidestep_arms::plan::{
     ChainConfigurationSpace, ChainPosture, ConfigurationSpace, JointPosture, JointSpace,
     PlanningQuery, plan, plan_joints,
@@ -18,6 +19,10 @@ use std::collections::VecDeque;
 
 /// Least fraction of a segment of the path that a cycle is worth.
 const MIN_FRACTION: f64 = 1e-6;
+/// Bisections of a straight piece of an arm's path: to a millionth of it, less than rounding of what a cycle allows.
+const BISECTIONS: usize = 20;
+/// Shares of a cycle's step that are tried, each half of the one before.
+const MAX_STEP_TRIES: usize = 5;
 /// Fraction of the speed limit that a shortened step aims at: by exactly the limit, rounding could exceed it again.
 const STEP_LIMIT_FRACTION: f64 = 0.99;
 
@@ -30,11 +35,7 @@ pub(super) fn plan_if_stuck<const D: usize>(
 ) {
     let Initiator { context, task, .. } = initiator;
     let body = &mut *acting.body;
-    let Some(after_s) = task.plans_after_s.filter(|_| body.plan.is_none()) else { return };
-    let after = ((after_s / context.world.dt_s).ceil() as u32).max(1);
-    let late = body.driving.late;
-    // After one, two, four, eight times that.
-    if !late.is_multiple_of(after) || !(late / after).is_power_of_two() {
+    if body.plan.is_some() || !is_plan_due(initiator, body.driving.late) {
         return;
     }
     let next = body.driving.next;
@@ -57,6 +58,14 @@ pub(super) fn plan_if_stuck<const D: usize>(
     };
     acting.sink.record(&body.chain, kind, k, value);
     body.plan = plan_found;
+}
+
+/// Returns whether a path is planned after so many cycles without coming nearer: after one, two, four, eight times the time
+/// of the task.
+pub(super) fn is_plan_due<const D: usize>(initiator: Initiator<'_, D>, late: u32) -> bool {
+    let Some(after_s) = initiator.task.plans_after_s else { return false };
+    let after = ((after_s / initiator.context.world.dt_s).ceil() as u32).max(1);
+    late.is_multiple_of(after) && (late / after).is_power_of_two()
 }
 
 /// Searches for a path: of an arm's joints, otherwise of rods.
@@ -157,39 +166,109 @@ fn follow_joint_path<const D: usize>(
     let self_collision = world.rules.self_collision;
     let present = JointPosture { arm, joints: &joints };
     let space = JointSpace::new(present, chain, obstacles, self_collision, initiator.task.agent);
-    let to = path.front()?;
-    let mut limits = StepLimits::from_initiator(initiator);
-    if let Some(escape) = &world.escape {
-        limits.joint = limits.joint.min(escape.speed_max_m_s * world.dt_s);
+    let step = JointStep {
+        arm,
+        space: &space,
+        start: chain.points(),
+        ranges: arm.motion.reference_ranges(&body.motion, &joints, arm.follower.limits()),
+        limits: StepLimits::for_joints(initiator),
+    };
+    let stop = StopCheck {
+        context: initiator.context,
+        arm,
+        chain,
+        k: initiator.task.agent,
+        line_tolerance_m: line_tolerance_m(initiator),
+    };
+    // The joints cut the corners of a path at which the reference does not stop. Where they would touch something, or
+    // leave a line, it goes less far, or waits for them.
+    let mut share = 1.0;
+    let mut last_try = None;
+    for _ in 0..MAX_STEP_TRIES {
+        let walked = step.walk(&joints, &path, share)?;
+        if stop.find_veto(&body.motion, &joints, &walked.joints).is_none() {
+            last_try = Some(walked);
+            break;
+        }
+        share *= 0.5;
     }
-    let motion = &body.motion;
-    let fraction = arm.motion.reachable_fraction(motion, &joints, to);
-    let segment = PathSegment { space: &space, from: &joints, to };
-    let (mut next, is_there) =
-        limits.next_posture(&segment, fraction, |values| arm.connector_positions::<D>(values));
-    // Rounding must not make a motion at exactly the maximum speed faster.
-    let ranges = arm.motion.reference_ranges(motion, &joints, arm.follower.limits());
-    for (x, [lower, upper]) in next.iter_mut().zip(ranges) {
-        *x = x.clamp(lower, upper);
-    }
+    let Some(WalkedPath { joints: next, passed }) = last_try else {
+        // Where the joints rest on the path, they will not come any nearer by waiting.
+        return (!body.motion.is_at_rest()).then_some(path);
+    };
     let from = chain.points().to_vec();
-    if !space.is_path_free(&joints, &next) {
-        return None;
-    }
-    // The joints cut the corners of a path at which the reference does not stop. Where they would touch something, it
-    // waits for them before it goes on.
-    let stop = StopCheck { context: initiator.context, arm, chain, k: initiator.task.agent };
-    if !motion.is_at_rest() && stop.find_veto(motion, &joints, &next).is_some() {
-        return Some(path);
-    }
     if !move_along(initiator, body, &from, &arm.connector_positions(&next)) {
         return None;
     }
     body.joints = Some(next);
-    if is_there {
-        path.pop_front();
-    }
+    path.drain(..passed);
     (!path.is_empty()).then_some(path)
+}
+
+/// Returns how far the tool may leave the line on which the present task leads it, if it does.
+fn line_tolerance_m<const D: usize>(initiator: Initiator<'_, D>) -> Option<f64> {
+    match &initiator.task.driver {
+        TaskKind::Targets(targets) if targets.path == TargetPath::Line => Some(targets.tolerance_m),
+        _ => None,
+    }
+}
+
+/// The limits of an arm's reference in a cycle.
+struct JointStep<'a, const D: usize> {
+    arm: &'a Arm,
+    space: &'a JointSpace<'a, D>,
+    /// The places of the connectors at the start of the cycle.
+    start: &'a [Point<D>],
+    /// Where each joint may be at its end.
+    ranges: Vec<[f64; 2]>,
+    limits: StepLimits,
+}
+
+/// The end of a cycle on a path.
+struct WalkedPath {
+    joints: Vec<f64>,
+    /// Number of postures of the path that it has passed or reached.
+    passed: usize,
+}
+
+impl<const D: usize> JointStep<'_, D> {
+    /// Returns where a path leads within a share of what a cycle allows; none if the path is blocked.
+    fn walk(&self, from: &[f64], path: &VecDeque<Vec<f64>>, share: f64) -> Option<WalkedPath> {
+        let mut at = from.to_vec();
+        for (passed, to) in path.iter().enumerate() {
+            if self.allows(from, to, share) {
+                if !self.space.is_path_free(&at, to) {
+                    return None;
+                }
+                at.clone_from(to);
+                continue;
+            }
+            let mut fraction = 0.0;
+            let mut half = 0.5;
+            for _ in 0..BISECTIONS {
+                if self.allows(from, &self.space.interpolate(&at, to, fraction + half), share) {
+                    fraction += half;
+                }
+                half *= 0.5;
+            }
+            let joints = self.space.interpolate(&at, to, fraction);
+            return self.space.is_path_free(&at, &joints).then_some(WalkedPath { joints, passed });
+        }
+        Some(WalkedPath { joints: at, passed: path.len() })
+    }
+
+    /// Returns whether a share of what a cycle allows leads from a posture to another.
+    fn allows(&self, from: &[f64], to: &[f64], share: f64) -> bool {
+        let is_in_range = |((from, to), [lower, upper]): ((&f64, &f64), &[f64; 2])| {
+            (share * (lower - from)..=share * (upper - from)).contains(&(to - from))
+        };
+        let points: Vec<Point<D>> = self.arm.connector_positions(to);
+        let k = self.limits.agent;
+        let mut moves_m = self.start.iter().zip(&points).map(|(a, b)| distance(*a, *b));
+        from.iter().zip(to).zip(&self.ranges).all(is_in_range)
+            && distance(self.start[k], points[k]) <= share * self.limits.led
+            && moves_m.all(|move_m| move_m <= share * self.limits.joint)
+    }
 }
 
 /// Moves the chain to the next posture of a planned path, unless it would tunnel through something or pass through itself.
@@ -234,6 +313,14 @@ impl StepLimits {
     fn from_initiator<const D: usize>(initiator: Initiator<'_, D>) -> Self {
         let joint = initiator.context.world.rules.joint_step_max_m;
         Self { agent: initiator.task.agent, led: initiator.step_m(), joint }
+    }
+
+    /// Returns the limits of an arm, which moves no faster than it escapes.
+    fn for_joints<const D: usize>(initiator: Initiator<'_, D>) -> Self {
+        let world = initiator.context.world;
+        let limits = Self::from_initiator(initiator);
+        let escape_m = world.escape.as_ref().map(|escape| escape.speed_max_m_s * world.dt_s);
+        Self { joint: escape_m.map_or(limits.joint, |most_m| limits.joint.min(most_m)), ..limits }
     }
 
     /// Returns the posture between two that is reached in one cycle, at most a `fraction` of the motion, and whether

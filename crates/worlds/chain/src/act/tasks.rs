@@ -1,9 +1,9 @@
 //! The ends of tasks: done, over in time, or given up.
 
 use super::event_sink::EventSink;
-use super::{ChainContext, Initiator};
+use super::{ChainContext, ChainCycleState, Initiator};
 use crate::driver::own_driver::DriverMemory;
-use crate::driver::{Task, TaskKind};
+use crate::driver::{Targets, Task, TaskKind};
 use crate::events::{Event, EventKind};
 use crate::metrics::AbandonedSubtask;
 use crate::state::{ChainBodyState, Standstill};
@@ -20,6 +20,29 @@ pub(super) fn task_end_event<const D: usize>(
     let given_up = body.tally.given_up.iter().filter(|part| part.task == driving.task).count();
     // Targets that the time limit cut off are neither.
     if driving.next as usize > given_up { EventKind::Done } else { EventKind::GivenUp }
+}
+
+/// Returns whether the present target is the last one of all tasks, at which an arm comes to rest.
+pub(super) fn is_last_target<const D: usize>(
+    initiator: Initiator<'_, D>,
+    body: &ChainBodyState<D>,
+    targets: &Targets<D>,
+) -> bool {
+    let driving = &body.driving;
+    driving.task as usize + 1 == initiator.context.spec.tasks.len()
+        && driving.next as usize + 1 == targets.places.len()
+}
+
+/// Counts the present target as reached, and goes on to the next.
+pub(super) fn complete_target<const D: usize>(
+    initiator: Initiator<'_, D>,
+    acting: &mut ChainCycleState<'_, D>,
+) {
+    let body = &mut *acting.body;
+    let number = f64::from(body.driving.next);
+    acting.sink.record(&body.chain, EventKind::Target, initiator.task.agent, number);
+    body.tally.done += 1;
+    body.driving.start_next_subtask();
 }
 
 /// Ends the present task, done or given up, and starts the next.

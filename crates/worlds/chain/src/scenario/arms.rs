@@ -4,12 +4,12 @@ use super::{ChainScenarioCompiler, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
-use sidestep_arms::kinematics::SerialChain;
+use sidestep_arms::kinematics::{SerialChain, Transform};
 use sidestep_arms::motion::{MotionFilter, joint_rates};
 use sidestep_import::report::Finding;
-use sidestep_import::urdf::Model;
 use sidestep_import::urdf::joint_limits::{self, GivenRates, JointRates};
 use sidestep_import::urdf::srdf::Semantics;
+use sidestep_import::urdf::{Model, Origin};
 use sidestep_kernel::InputError;
 use sidestep_scenario::Spanned;
 use std::ops::Range;
@@ -39,7 +39,38 @@ pub(super) struct ArmSection {
     max_acceleration: Option<PositiveNumber>,
     /// Highest jerk of all joints, in rad/s3 or m/s3.
     max_jerk: Option<PositiveNumber>,
+    /// The tool that the tip carries.
+    pub(super) tool: Option<ToolSection>,
 }
+
+/// A tool on the tip of an arm, and its load.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ToolSection {
+    /// The point that targets are for, in the frame of the tip.
+    #[serde(default)]
+    xyz_m: [f64; 3],
+    /// Roll, pitch and yaw of the tool's frame in that of the tip, as in URDF.
+    #[serde(default)]
+    rpy_rad: [f64; 3],
+    /// Radius of the tool, a rod from the last joint axis to its point.
+    pub(super) radius_m: Option<PositiveNumber>,
+    /// Radius of the load, a ball around the point.
+    pub(super) load_radius_m: Option<PositiveNumber>,
+}
+
+impl ToolSection {
+    /// Returns the frame of the tool in that of the tip; none if a number is out of range.
+    fn transform(&self) -> Option<Transform> {
+        let is_valid = |x: &f64| x.abs() <= MAX_TOOL;
+        let numbers = self.xyz_m.iter().chain(&self.rpy_rad);
+        let origin = Origin { xyz_m: self.xyz_m, rpy_rad: self.rpy_rad };
+        numbers.clone().all(is_valid).then(|| Transform::from_urdf_origin(&origin))
+    }
+}
+
+/// Largest coordinate of a tool, m and rad: more is a mistake.
+const MAX_TOOL: f64 = 1e3;
 
 impl ArmSection {
     /// Returns the rates that no joint exceeds.
@@ -73,6 +104,17 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let place = s.urdf.as_deref().unwrap_or("urdf_text");
         let serial = SerialChain::new(&model, base, tip, place)
             .map_err(|error| self.source.error_from(at.clone(), &error))?;
+        let serial = match &s.tool {
+            Some(tool) => {
+                let tool = tool.transform().ok_or_else(|| {
+                    let at = self.source.key_span(at.clone(), &["tool"]);
+                    let remedy = format!("give finite numbers up to {MAX_TOOL:e}");
+                    self.source.error(at, "a tool out of range", remedy)
+                })?;
+                serial.with_tool(&tool)
+            }
+            None => serial,
+        };
         if serial.variables.is_empty() {
             let at = self.source.key_span(at, &["tip", "base", "urdf", "urdf_text"]);
             let cause = format!("nothing moves between {} and {}", serial.base, serial.tip);

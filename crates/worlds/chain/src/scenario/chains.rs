@@ -211,7 +211,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     ) -> Result<ChainSpec<D>, InputError> {
         let s = section.get_ref();
         let (start, arm) = self.compile_chain_shape(section, around)?;
-        let tasks = self.tasks(section, &start)?;
+        let tasks = self.tasks(section, &start, arm.as_deref())?;
         if let Some(arm) = &arm {
             for (section, task) in s.tasks.0.iter().zip(&tasks) {
                 self.check_arm_targets_reachable(section, task, arm)?;
@@ -238,9 +238,10 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         &self,
         section: &Spanned<ChainSection<D>>,
         start: &Chain<D>,
+        arm: Option<&Arm>,
     ) -> Result<Vec<Task<D>>, InputError> {
         let s = section.get_ref();
-        let tasks = s.tasks.0.iter().map(|task| self.task(task, s, start));
+        let tasks = s.tasks.0.iter().map(|task| self.task(task, s, start, arm));
         let tasks = tasks.collect::<Result<Vec<_>, _>>()?;
         for (section, task) in s.tasks.0.iter().zip(&tasks) {
             self.check_leader(s, section, task, start)?;
@@ -457,7 +458,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     fn arm_and_chain(
         &self,
         section: &Spanned<ChainSection<D>>,
-        arm: &Spanned<ArmSection>,
+        arm_section: &Spanned<ArmSection>,
         radius_m: f64,
     ) -> Result<(Chain<D>, Arc<Arm>), InputError> {
         let s = section.get_ref();
@@ -473,19 +474,28 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             return Err(self.source.error(at, "an arm has its shape from its URDF file", remedy));
         }
         let base_m = s.at_m.map_or([0.0; D], PointValue::get);
-        let arm_span = arm.span();
-        let arm = self.compile_arm(arm, to_dimensions(base_m))?;
+        let arm_span = arm_section.span();
+        let arm = self.compile_arm(arm_section, to_dimensions(base_m))?;
         let solid = arm.chain(radius_m, s.rod_radius_m.unwrap_or(LINK_RADIUS_FACTOR * radius_m));
         let solid = solid.map_err(|error| self.source.error_from(arm_span, &error))?;
         // `D` is three here, which the compiler cannot know.
         let points = solid.points().iter().map(|p| to_dimensions(*p)).collect();
         let mut connectors: Vec<_> = solid.connectors().iter().map(convert_arm_connector).collect();
+        let mut rods = solid.rods().to_vec();
+        if let Some(tool) = &arm_section.get_ref().tool {
+            if let (Some(load), Some(radius_m)) = (connectors.last_mut(), tool.load_radius_m) {
+                load.radius_m = radius_m.into();
+            }
+            if let (Some(rod), Some(radius_m)) = (rods.last_mut(), tool.radius_m) {
+                rod.radius_m = radius_m.into();
+            }
+        }
         self.check_limits(&s.limits)?;
         for limit in &s.limits.0 {
             self.apply_limit_section(&mut connectors, limit)?;
         }
         self.check_arm_whole(section, &connectors)?;
-        let chain = Chain::new(points, connectors, solid.rods().to_vec())
+        let chain = Chain::new(points, connectors, rods)
             .map_err(|error| self.source.error_from(at, &error))?;
         Ok((chain, Arc::new(arm)))
     }

@@ -5,6 +5,7 @@ use super::ChainScenarioCompiler;
 use super::chains::ChainSection;
 use super::tasks::TaskSection;
 use sidestep_arms::Arm;
+use sidestep_arms::plan::JointGoal;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::distance;
 use sidestep_rods::{Chain, Mobility};
@@ -49,7 +50,12 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     ) -> Result<(), InputError> {
         let TaskKind::Targets(targets) = &task.driver else { return Ok(()) };
         for (i, at) in targets.places.iter().enumerate() {
-            let (chain, goal) = arm.goal(task.agent, *at, targets.tolerance_m);
+            let (chain, goal) = match targets.goals.get(i) {
+                // Joint values are within the limits, as was checked when they were read.
+                Some(JointGoal::Values(_)) => continue,
+                Some(JointGoal::Pose(pose)) => (arm.serial.clone(), pose.clone()),
+                None => arm.goal(task.agent, *at, targets.tolerance_m),
+            };
             let answer = chain
                 .solve(&goal, &arm.values)
                 .map_err(|error| self.source.error_from(section.span(), &error))?;

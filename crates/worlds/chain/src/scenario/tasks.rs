@@ -5,10 +5,12 @@ use super::super::driver::own_driver::OwnDriver;
 use super::super::driver::{MAX_MOTIONS, Targets, Task, TaskKind, Wander};
 use super::super::script::{Script, ScriptMotion, Turtle};
 use super::chains::ChainSection;
+use super::joint_goals::{FreeAxis, PathWord, ToolContext};
 use super::navigators::NavigatorSection;
 use super::{BoxSection, ChainScenarioCompiler, MAX_VALUE, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use sidestep_arms::Arm;
 use sidestep_kernel::InputError;
 use sidestep_rods::{Chain, Connector, Mobility};
 use sidestep_scenario::{ByName, Spanned};
@@ -18,7 +20,7 @@ use std::sync::Arc;
 /// Speed of initiators, and of connectors that come back, unless it is given: that of the measured leader.
 pub(super) const DEFAULT_SPEED_M_S: f64 = 0.5;
 /// Distance at which a target counts as reached, meters.
-const DEFAULT_TOLERANCE_M: f64 = 1e-3;
+pub(super) const DEFAULT_TOLERANCE_M: f64 = 1e-3;
 /// Time of vetoes after which a task is given up, unless it is given, s: a planner makes four
 /// attempts in it.
 const DEFAULT_PATIENCE_S: f64 = 5.0;
@@ -77,8 +79,20 @@ pub(super) struct TaskSection<const D: usize> {
     script: Option<String>,
     script_file: Option<String>,
     /// Places to go to, one after the other.
-    targets_m: Option<Vec<PointValue<D>>>,
-    tolerance_m: Option<PositiveNumber>,
+    pub(super) targets_m: Option<Vec<PointValue<D>>>,
+    pub(super) tolerance_m: Option<PositiveNumber>,
+    /// Orientation of an arm's tool at each target: roll, pitch and yaw, as in URDF; or one for all.
+    pub(super) rpy_rad: Option<Vec<[f64; 3]>>,
+    /// The same as quaternions x, y, z, w.
+    pub(super) quaternions: Option<Vec<[f64; 4]>>,
+    /// Parts of the targets' poses that do not count.
+    pub(super) free: Option<Vec<FreeAxis>>,
+    /// Angle at which an orientation counts as reached.
+    pub(super) tolerance_rad: Option<PositiveNumber>,
+    /// Values of all joints at each target, in place of places.
+    pub(super) joints: Option<Vec<Vec<f64>>>,
+    /// The way from one target to the next.
+    pub(super) path: Option<PathWord>,
     navigator: Option<Spanned<NavigatorSection>>,
     planner: Option<PlannerWord>,
     plans_after_s: Option<PositiveNumber>,
@@ -129,6 +143,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         section: &Spanned<TaskSection<D>>,
         section_of_chain: &ChainSection<D>,
         chain: &Chain<D>,
+        arm: Option<&Arm>,
     ) -> Result<Task<D>, InputError> {
         let s = section.get_ref();
         let at = section.span();
@@ -146,7 +161,8 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let driver = match &s.kind {
             ByName::BuiltIn(word) => {
                 self.check_keys(s, plans, at.clone())?;
-                self.driver(*word, s, at)?
+                let tool = ToolContext { arm, connector: s.connector };
+                self.driver(*word, s, tool, at)?
             }
             ByName::Own(name) => {
                 // Where its kind is unknown, that is the error to report, and not that keys have no effect in it.
@@ -200,6 +216,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         &self,
         word: TaskKindWord,
         s: &TaskSection<D>,
+        tool: ToolContext<'_>,
         at: Range<usize>,
     ) -> Result<TaskKind<D>, InputError> {
         Ok(match word {
@@ -213,7 +230,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
                 self.check_script(&script, at)?;
                 TaskKind::Script(Arc::new(script))
             }
-            TaskKindWord::Targets => TaskKind::Targets(self.targets(s, at)?),
+            TaskKindWord::Targets => TaskKind::Targets(self.targets(s, tool, at)?),
             TaskKindWord::External => TaskKind::External,
             TaskKindWord::Navigate if D != 2 => {
                 let remedy = "set chain.dimensions = 2, or give another kind";
@@ -271,14 +288,20 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         Ok(())
     }
 
-    fn targets(&self, s: &TaskSection<D>, at: Range<usize>) -> Result<Targets<D>, InputError> {
-        let Some(given) = s.targets_m.as_ref().filter(|list| !list.is_empty()) else {
+    fn targets(
+        &self,
+        s: &TaskSection<D>,
+        tool: ToolContext<'_>,
+        at: Range<usize>,
+    ) -> Result<Targets<D>, InputError> {
+        let given = s.targets_m.as_deref().unwrap_or_default();
+        if given.is_empty() && s.joints.is_none() {
             let remedy = "add targets_m = [[x, y], ...]";
             let at = self.source.key_span(at, &["targets_m", "kind"]);
             return Err(self.source.error(at, "a task of kind targets needs targets", remedy));
-        };
+        }
         let places = given.iter().map(|place| place.get()).collect();
-        Ok(Targets { places, tolerance_m: s.tolerance_m.map_or(DEFAULT_TOLERANCE_M, f64::from) })
+        self.add_joint_goals(s, tool, self.plain_targets(s, places), at)
     }
 
     /// Refuses keys that have no effect in a task of this kind.
@@ -295,6 +318,12 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             ("script_file", s.script_file.is_some(), TaskKindWord::Script),
             ("targets_m", s.targets_m.is_some(), TaskKindWord::Targets),
             ("tolerance_m", s.tolerance_m.is_some(), TaskKindWord::Targets),
+            ("rpy_rad", s.rpy_rad.is_some(), TaskKindWord::Targets),
+            ("quaternions", s.quaternions.is_some(), TaskKindWord::Targets),
+            ("free", s.free.is_some(), TaskKindWord::Targets),
+            ("tolerance_rad", s.tolerance_rad.is_some(), TaskKindWord::Targets),
+            ("joints", s.joints.is_some(), TaskKindWord::Targets),
+            ("path", s.path.is_some(), TaskKindWord::Targets),
             ("navigator", s.navigator.is_some(), TaskKindWord::Navigate),
             ("planner", s.planner.is_some(), TaskKindWord::Targets),
         ];
@@ -307,6 +336,11 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             !matches!(s.built_in_kind(), Some(TaskKindWord::External | TaskKindWord::Rest));
         let patience = ("patience_s", s.patience_s.is_some(), is_patient);
         self.source.refuse_unused_keys(at.clone(), &[patience], &context)?;
+        if s.needs_plan() && !plans {
+            let at = self.source.key_span(at, &["planner", "kind"]);
+            let cause = "orientations, lines and joint values of an arm's tool are always planned";
+            return Err(self.source.error(at, cause, "leave planner = \"none\" out"));
+        }
         let delay = ("plans_after_s", s.plans_after_s.is_some(), plans);
         self.source.refuse_unused_keys(at, &[delay], "without a planner")
     }

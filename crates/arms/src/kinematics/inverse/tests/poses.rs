@@ -1,7 +1,7 @@
 //! Orientations, free axes, several postures and the nearest one.
 
 use super::*;
-use sidestep_import::urdf::Origin;
+use sidestep_import::urdf::{Limits, Origin};
 use sidestep_kernel::math::{acos, wrap_angle};
 
 /// Six joints with offsets everywhere, so that no two axes meet.
@@ -213,6 +213,27 @@ fn full_turns_are_no_posture_of_their_own_and_the_nearest_counts() {
     let answer = arm.solve(&goal, &[6.0, 0.5]).expect("right");
     assert!(answer.reached && answer.others.len() == 1, "{answer:?}");
     assert!((answer.values[0] - 6.0).abs() < std::f64::consts::PI);
+}
+
+/// A pose that the arm reaches with one joint slightly beyond its limit: however many joints an unlimited search moves
+/// outside, that one is the reason, with its excess, and with what remains within the limits.
+#[test]
+fn the_nearest_cause_is_the_limit_that_is_missed_by_least() {
+    let mut arm = six();
+    let beyond = [0.4, 1.25, -0.5, 0.3, 0.6, 0.2];
+    // So narrow that no other posture of the elbow or of the wrist is within the limits.
+    for (variable, value) in arm.variables.iter_mut().zip(beyond) {
+        variable.limits = Some(Limits { lower: value - 0.3, upper: value + 0.3 });
+    }
+    arm.variables[1].limits = Some(Limits { lower: 0.8, upper: 1.2 });
+    let target = arm.forward_kinematics(&beyond).tip;
+    let goal = ArmGoal { restarts: 30, ..ArmGoal::from_pose(target) };
+    let answer = arm.solve(&goal, &arm.rest_values()).expect("right");
+    let Some(IkFailure::OutsideLimits { joint, value, upper, error_m, .. }) = answer.reason else {
+        panic!("{:?}", answer.reason)
+    };
+    assert!(joint == "j2" && (value - upper - 0.05).abs() < 1e-3, "{joint}: {value}");
+    assert!((error_m - answer.error_m).abs() < 1e-9 && error_m > 0.0, "{error_m}");
 }
 
 #[test]

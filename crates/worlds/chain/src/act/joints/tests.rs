@@ -5,7 +5,7 @@ use crate::scenario::ChainScenario;
 use crate::world_impl::ChainRun;
 use sidestep_arms::kinematics::SerialChain;
 use sidestep_import::urdf::Model;
-use sidestep_kernel::geometry::distance;
+use sidestep_kernel::geometry::{distance, norm, normalized, perpendicular_component, sub};
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use sidestep_kernel::{Seed, Simulation};
 use sidestep_scenario::Source;
@@ -183,4 +183,99 @@ fn an_arm_gets_out_of_the_way_at_the_speeds_of_its_joints() {
     let tally = run.world().chain_metrics(run.state(), 0).tally;
     assert!(tally.escapes.moves > 0, "it gives way");
     assert_eq!(tally.penetrations, 0);
+}
+
+/// The tool points down at each target, and may be turned about its axis.
+#[test]
+fn a_tool_is_turned_as_its_targets_ask() {
+    let task = "kind = \"targets\"\nconnector = 3\ntargets_m = [[0.45, 0.1, 0.5], [0.35, -0.3, 0.6]]\n\
+                rpy_rad = [[3.141592653589793, 0.0, 0.0]]\nfree = [\"rz\"]";
+    let mut run = arm(&shipped(), "[chain]\ndimensions = 3", task);
+    assert_joints_keep_their_laws(&mut run, 5000, "poses");
+    assert_all_is_reached(&run, "poses");
+    let arm = run.world().chains[0].arm.clone().expect("an arm");
+    let tip = arm.serial.forward_kinematics(&joints(&run)).tip;
+    assert!(distance(tip.origin_m, [0.35, -0.3, 0.6]) <= 1e-3);
+    let down = tip.transform_direction([0.0, 0.0, 1.0]);
+    assert!(down[2] < -1.0 + 1e-6, "{down:?}");
+}
+
+#[test]
+fn joints_end_at_the_values_that_are_asked_for_around_an_obstacle() {
+    let values = [1.2, 0.5, 0.0, 1.0, 0.0, 0.5, 0.3];
+    let task = format!("kind = \"targets\"\nconnector = 3\njoints = [{values:?}]\nspeed_m_s = 0.4");
+    let pillar = "[chain]\ndimensions = 3\n[[obstacles]]\nends_m = [[0.34, 0.24, 0.0], [0.34, 0.24, 1.2]]\nradius_m = 0.05";
+    let mut run = arm(&shipped(), pillar, &task);
+    assert_joints_keep_their_laws(&mut run, 5000, "joints");
+    assert_all_is_reached(&run, "joints");
+    let now = joints(&run);
+    assert!(now.iter().zip(values).all(|(a, b)| (a - b).abs() < 1e-9), "{now:?}");
+    assert_eq!(run.world().chain_metrics(run.state(), 0).tally.penetrations, 0);
+}
+
+/// A square with straight sides, seen by forward kinematics in every cycle.
+#[test]
+fn a_tool_goes_along_straight_lines() {
+    let corners = [[0.5, -0.15, 0.6], [0.5, 0.15, 0.6], [0.4, 0.15, 0.75], [0.5, -0.15, 0.6]];
+    let task = format!(
+        "kind = \"targets\"\nconnector = 3\ntargets_m = {corners:?}\npath = \"line\"\nspeed_m_s = 0.4\ntolerance_m = 5e-4"
+    );
+    let mut run = arm(&shipped(), "[chain]\ndimensions = 3", &task);
+    let mut from = run.state().body(0).chain.points()[3];
+    let mut farthest_m: f64 = 0.0;
+    let mut fastest_m_s: f64 = 0.0;
+    let mut tool = from;
+    while run.cycle() < 5000 && !run.is_over() {
+        let next = run.state().body(0).driving.next as usize;
+        run.advance(1);
+        let body = run.state().body(0);
+        let at = body.chain.points()[3];
+        fastest_m_s = fastest_m_s.max(distance(at, tool) / 0.02);
+        tool = at;
+        if let Some(corner) = corners.get(next).filter(|_| body.driving.task == 0) {
+            let along = normalized(sub(*corner, from)).expect("a length");
+            farthest_m = farthest_m.max(norm(perpendicular_component(sub(at, from), along)));
+            if body.driving.next as usize > next {
+                from = at;
+            }
+        }
+    }
+    assert_all_is_reached(&run, "line");
+    assert!(farthest_m <= 5e-4, "{farthest_m}");
+    assert!(fastest_m_s > 0.2, "{fastest_m_s}");
+}
+
+#[test]
+fn what_only_a_tool_can_do_is_refused_elsewhere_with_a_remedy() {
+    let cause = |task: &str| {
+        let urdf = shipped();
+        let text = format!(
+            "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\narm = {{ urdf = {urdf} }}\n\
+             radius_m = 0.02\n[[chains.tasks]]\n{task}"
+        );
+        let source = Source::new("s.toml", &text, root());
+        let error = ChainScenario::<3>::new(&source).expect_err("wrong");
+        (error.cause().to_string(), error.remedy().to_string())
+    };
+    let goes = "kind = \"targets\"\ntargets_m = [[0.4, 0.1, 0.6]]";
+    for (task, words) in [
+        (format!("{goes}\nconnector = 2\nrpy_rad = [[0, 0, 0]]"), "give connector = 3, the tool"),
+        (format!("{goes}\nconnector = 3\nfree = [\"rz\"]"), "add rpy_rad or quaternions"),
+        (
+            format!("{goes}\nconnector = 3\nrpy_rad = [[0, 0, 0], [0, 0, 1]]"),
+            "give one for each target, or one for all",
+        ),
+        (
+            format!("{goes}\nconnector = 3\npath = \"line\"\nplanner = \"none\""),
+            "leave planner = \"none\" out",
+        ),
+        (
+            "kind = \"targets\"\nconnector = 3\njoints = [[0, 9, 0, 1, 0, 0.5, 0]]".into(),
+            "stay between -2.094 and 2.094 rad",
+        ),
+        ("kind = \"rest\"\nconnector = 3\npath = \"line\"".into(), "leave"),
+    ] {
+        let (cause, remedy) = cause(&task);
+        assert!(remedy.contains(words), "{task}: {cause}; {remedy}");
+    }
 }
