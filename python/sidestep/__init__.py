@@ -18,7 +18,7 @@ The same scenario and seed give the same bits for any number of workers, in the 
 
 from . import collectives, learn, stats
 from ._agents import Agent, Each, each
-from ._arm import FkResult, IkResult, fk, ik
+from ._arm import ArmTrajectory, FkResult, IkResult, fk, ik, trajectories
 from ._errors import (
     CheckpointError,
     ClosedError,
@@ -50,6 +50,7 @@ from ._sweep import Comparison, Sweep, compare, sweep
 __all__ = [
     "Agent",
     "Arm",
+    "ArmTrajectory",
     "Batch",
     "Blocks",
     "CheckpointError",
@@ -87,5 +88,6 @@ __all__ = [
     "stats",
     "sweep",
     "sweep_status",
+    "trajectories",
     "worlds",
 ]

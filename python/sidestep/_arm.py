@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._errors import checked_int, input_error
-from ._native import Arm
+from ._native import Arm, arm_trajectories
 
 _Floats = NDArray[np.float64]
 
@@ -52,6 +52,35 @@ class IkResult(NamedTuple):
     others: list[_Floats]
     #: Meshes that are approximated by boxes, and shapes that could not be read.
     remarks: list[str]
+
+
+class ArmTrajectory(NamedTuple):
+    """Motion of the joints of one arm in a recorded run, one row per point of time."""
+
+    #: Number of its chain.
+    chain: int
+    #: Name of its chain, or ``chain_`` and its number.
+    name: str
+    #: Names of its joints, from base to tip.
+    joints: list[str]
+    #: Times in s since the start of the run, of the shape (n,).
+    times_s: _Floats
+    #: Values of the joints in rad or m, of the shape (n, joints).
+    positions: _Floats
+    #: Their speeds in rad/s or m/s, of the shape (n, joints).
+    velocities: _Floats
+    #: Their accelerations in rad/s2 or m/s2, of the shape (n, joints).
+    accelerations: _Floats
+
+
+def trajectories(folder: str | os.PathLike[str], *, every: int = 1) -> list[ArmTrajectory]:
+    """Motions of the joints of all arms of a recorded run, as ``sidestep export --to trajectory`` writes them.
+
+    ``folder`` is the folder of a run; only cycles that are multiples of ``every`` count.
+
+    Raises InputError when the run has no arms, or a file is damaged.
+    """
+    return arm_trajectories(folder, checked_int("every", every, 1, 2**32))
 
 
 def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> FkResult:

@@ -6,7 +6,7 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arm import FkResult, IkResult
+from ._arm import ArmTrajectory, FkResult, IkResult
 from ._engines import Trial
 from ._inspect import Finding
 from ._status import SweepStatus
@@ -323,6 +323,7 @@ class Arm:
     def forward(self, joints: _Reals) -> FkResult: ...
     def inverse(self, targets: _Reals, start: _Reals, options: Mapping[str, Any]) -> IkResult: ...
 
+def arm_trajectories(folder: str | PathLike[str], every: int) -> list[ArmTrajectory]: ...
 @final
 class Learned:
     @property

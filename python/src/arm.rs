@@ -5,6 +5,7 @@ use crate::error::{self, argument_error};
 use crate::json::to_list;
 use crate::result::{Fields, ResultClass};
 use crate::watch::run_polling;
+use crate::worlds;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -15,6 +16,7 @@ use sidestep::arms::kinematics::{
 };
 use sidestep::experiment::sweep::scheduler::run_trials;
 use sidestep::kernel::InputError;
+use sidestep_session::{ArmTrajectory, Error, RecordedRun};
 use std::path::PathBuf;
 
 /// An arm of a robot model (URDF): its joints from a base link to a tip link.
@@ -112,6 +114,34 @@ fn to_array<'py>(
     shape: Vec<usize>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     PyArray1::from_vec(py, flat).reshape(shape)
+}
+
+/// Returns the motions of the arms of a recorded run: the native part of `sidestep.trajectories`.
+#[pyfunction]
+pub(crate) fn arm_trajectories(
+    py: Python<'_>,
+    folder: PathBuf,
+    every: u64,
+) -> PyResult<Vec<Bound<'_, PyAny>>> {
+    let read = py.detach(|| {
+        let recorded = RecordedRun::open(worlds::list(), &folder)?;
+        sidestep_session::arm_trajectories(&recorded, 0..=recorded.cycles_done, every)
+    });
+    let arms = read.map_err(|e: Error| error::session_error(&e))?;
+    arms.into_iter().map(|arm| trajectory_result(py, arm)).collect()
+}
+
+fn trajectory_result(py: Python<'_>, arm: ArmTrajectory) -> PyResult<Bound<'_, PyAny>> {
+    let shape = || vec![arm.times_s.len(), arm.joints.len()];
+    Fields::new(py)
+        .with("chain", arm.chain)?
+        .with("name", &arm.name)?
+        .with("joints", PyList::new(py, &arm.joints)?)?
+        .with("times_s", arm.times_s.to_pyarray(py))?
+        .with("positions", to_array(py, arm.positions.concat(), shape())?)?
+        .with("velocities", to_array(py, arm.velocities.concat(), shape())?)?
+        .with("accelerations", to_array(py, arm.accelerations.concat(), shape())?)?
+        .build(ResultClass("sidestep._arm", "ArmTrajectory"))
 }
 
 #[pymethods]

@@ -87,6 +87,7 @@ fn add_sweeps(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 fn add_analysis(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<arm::Arm>()?;
+    module.add_function(wrap_pyfunction!(arm::arm_trajectories, module)?)?;
     module.add_class::<learn::Learned>()?;
     module.add_function(wrap_pyfunction!(collectives::minimize_objective, module)?)?;
     module.add_function(wrap_pyfunction!(collectives::minimize_pairs, module)?)?;

@@ -55,6 +55,20 @@ def test_inverse_kinematics_is_that_of_the_command_whatever_the_workers(urdf, co
     assert turned.reached.all() and max(turned.error_rad) < 1e-6
 
 
+def test_motions_of_arms_are_those_that_the_command_exports(root, command, tmp_path):
+    scenario = root / "scenarios/chain/arm.toml"
+    told(command, "run", scenario, "--cycles", "60", "--out", tmp_path / "run")
+    told(command, "export", tmp_path / "run", "--to", "trajectory", "--every", "2", "--out", tmp_path / "out")
+    written = json.loads((tmp_path / "out/reacher.json").read_text())
+    [arm] = sidestep.trajectories(tmp_path / "run", every=2)
+    assert (arm.chain, arm.name, arm.joints) == (0, "reacher", written["joint_names"])
+    for name in ("positions", "velocities", "accelerations"):
+        np.testing.assert_array_equal(getattr(arm, name), [point[name] for point in written["points"]])
+    np.testing.assert_allclose(np.diff(arm.times_s), 0.04)
+    with pytest.raises(sidestep.InputError, match="every"):
+        sidestep.trajectories(tmp_path / "run", every=0)
+
+
 def test_targets_out_of_reach_say_why(urdf):
     found = sidestep.ik(urdf, [[0.0, 0.0, 99.0]], restarts=3)
     assert not found.reached[0] and found.error_m[0] > 90

@@ -24,6 +24,8 @@ const JOINT_TOLERANCE: f64 = 1e-9;
 /// the line by less than 5 um on an arm of 1 m.
 const LINE_STEP_M: f64 = 5e-3;
 const LINE_STEP_RAD: f64 = 0.02;
+/// Tolerance of each of these postures, m and rad: all of what a task allows is left for the smoothing of the motion.
+const LINE_TOLERANCE: f64 = 1e-6;
 /// Largest change of a joint in such a step, rad or m: beyond it the line passes a singular posture, where a joint has to
 /// turn on the spot.
 const MAX_JOINT_STEP: f64 = 0.2;
@@ -101,7 +103,13 @@ pub fn plan_line<const D: usize>(
         let turned = Transform::from_rotation_vector(scaled(turn, fraction))
             .compose(&Transform { origin_m: [0.0; 3], ..start });
         let target = Transform { origin_m: add_scaled(start.origin_m, way, fraction), ..turned };
-        let goal = ArmGoal { target, restarts: 0, solutions: 1, ..solved_goal(goal) };
+        let goal = ArmGoal {
+            target,
+            restarts: 0,
+            tolerance_m: LINE_TOLERANCE.min(goal.tolerance_m),
+            tolerance_rad: LINE_TOLERANCE.min(goal.tolerance_rad),
+            ..goal.clone()
+        };
         let answer = arm.serial.solve(&goal, &at)?;
         let mut changes = answer.values.iter().zip(&at).map(|(to, from)| (to - from).abs());
         let is_steady = changes.all(|change| change <= MAX_JOINT_STEP);
