@@ -1,8 +1,11 @@
 //! An arm of joints as a chain of rods (slides K1 to K4).
 
-use super::kinematics::{ArmGoal, ConnectorTargetSolver, SerialChain, Skeleton, Vector};
+use super::kinematics::{
+    ArmBody, ArmGoal, BodyPosture, ConnectorTargetSolver, SerialChain, Skeleton, Vector,
+};
 use super::motion::MotionFilter;
 use sidestep_import::report::Finding;
+use sidestep_import::urdf::Solid;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, convert_dimensions, sub};
 use sidestep_rods::{Chain, Connector, Mobility, Rod};
@@ -30,6 +33,12 @@ pub struct Arm {
     pub follower: ConnectorTargetSolver,
     /// Keeps the joints to their rates.
     pub motion: MotionFilter,
+    /// The shapes of its links, which then must not touch anything, in place of its rods; none where its rods count.
+    pub body: Option<ArmBody>,
+    /// Parts of its body that overlap at the start, by name with their depth in m: they may.
+    pub exempt_overlaps: Vec<(String, String, f64)>,
+    /// The shapes of its links as they were read, where some are meshes; none otherwise.
+    pub solids: Vec<Solid>,
     /// What was not taken as it stood in its files; none where it is of no file.
     pub findings: Vec<Finding>,
 }
@@ -41,7 +50,35 @@ impl Arm {
         let skeleton = serial.skeleton();
         let follower = ConnectorTargetSolver::new(&serial, &skeleton);
         let values = follower.clamp(values);
-        Self { values, skeleton, serial, at_m, follower, motion, findings: Vec::new() }
+        Self {
+            values,
+            skeleton,
+            serial,
+            at_m,
+            follower,
+            motion,
+            body: None,
+            exempt_overlaps: Vec::new(),
+            solids: Vec::new(),
+            findings: Vec::new(),
+        }
+    }
+
+    /// Returns the arm with a body of shapes. Parts that overlap at its start may touch.
+    #[must_use]
+    pub fn with_body(self, mut body: ArmBody) -> Self {
+        let exempt_overlaps = body.exempt_overlaps(self.posture(&self.values));
+        Self { body: Some(body), exempt_overlaps, ..self }
+    }
+
+    /// Returns a posture in the world.
+    pub fn posture<'a>(&'a self, values: &'a [f64]) -> BodyPosture<'a> {
+        BodyPosture { chain: &self.serial, at_m: self.at_m, values }
+    }
+
+    /// Returns the connector that stands for a link, the base being link 0.
+    pub fn connector_of_link(&self, link: usize) -> usize {
+        self.skeleton.connector_of_link(link)
     }
 
     /// Returns the arm as a chain with a fixed base: the guide of its joints. Joint limits become bend limits if

@@ -51,6 +51,16 @@ impl LinkAnchor {
     }
 }
 
+impl Skeleton {
+    /// Returns the first connector that is fixed in a link, or else the last before it.
+    pub(crate) fn connector_of_link(&self, link: usize) -> usize {
+        let mut anchors = self.connectors.iter();
+        let fixed = anchors.position(|anchor| (anchor.first..=anchor.last).contains(&link));
+        let before = self.connectors.iter().rposition(|anchor| anchor.first <= link);
+        fixed.or(before).unwrap_or(0)
+    }
+}
+
 impl SerialChain {
     /// Returns the arm's connectors and rods. They do not depend on the posture.
     pub fn skeleton(&self) -> Skeleton {

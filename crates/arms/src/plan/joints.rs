@@ -3,11 +3,11 @@
 use super::{ConfigurationSpace, PlanningQuery};
 use crate::arm::Arm;
 use crate::ik::constraints::ConstraintChecker;
-use crate::kinematics::{ArmGoal, JointMotionKind};
+use crate::kinematics::{ArmBody, ArmGoal, JointMotionKind};
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::Point;
-use sidestep_rods::{Chain, Obstacles, Veto};
+use sidestep_rods::{Chain, Obstacles, Veto, VetoReason};
 use std::f64::consts::PI;
 
 /// Largest number of distinct postures at a target that are sought: an arm of six joints with a spherical wrist has
@@ -37,6 +37,8 @@ pub struct JointSpace<'a, const D: usize> {
     arm: &'a Arm,
     present: &'a [f64],
     checker: ConstraintChecker<'a, D>,
+    /// In place of the obstacles where its body is checked against them.
+    no_obstacles: Obstacles<D>,
     k: usize,
     /// Longest move of a connector between two postures that are checked, meters.
     step_m: f64,
@@ -54,16 +56,48 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         let JointPosture { arm, joints } = present;
         let checker = ConstraintChecker { chain, obstacles, self_collision };
         let step_m = chain.step_m().max(MIN_STEP * arm.skeleton.reach_m);
-        Self { arm, present: joints, checker, k, step_m }
+        Self { arm, present: joints, checker, no_obstacles: Obstacles::default(), k, step_m }
     }
 
     pub(super) fn arm(&self) -> &'a Arm {
         self.arm
     }
 
-    /// Returns the objection to the places of an arm's connectors, if there is one.
-    pub fn find_veto(&self, points: &[Point<D>]) -> Option<Veto<D>> {
-        self.checker.find_veto(points, self.k)
+    /// Returns the objection to a posture, if there is one; `points` are where it puts the connectors.
+    pub fn find_veto(&self, posture: &[f64], points: &[Point<D>]) -> Option<Veto<D>> {
+        let Some(body) = &self.arm.body else { return self.checker.find_veto(points, self.k) };
+        // What the joints cannot break, but failed connectors and bends that a scenario limits can.
+        let alone = ConstraintChecker {
+            obstacles: &self.no_obstacles,
+            self_collision: false,
+            ..self.checker
+        };
+        alone.find_veto(points, self.k).or_else(|| self.find_body_veto(body, posture, points))
+    }
+
+    /// Returns the objection of a link that would be in something, or deeper in it than it is now: an arm that starts inside
+    /// must be able to get out.
+    fn find_body_veto(
+        &self,
+        body: &ArmBody,
+        posture: &[f64],
+        points: &[Point<D>],
+    ) -> Option<Veto<D>> {
+        let ConstraintChecker { obstacles, self_collision, .. } = self.checker;
+        let contact_at =
+            |values| body.deepest_contact(self.arm.posture(values), obstacles, self_collision);
+        let contact = contact_at(posture)?;
+        let present_m = contact_at(self.present).map_or(0.0, |present| present.depth_m);
+        if contact.depth_m <= present_m {
+            return None;
+        }
+        let reason = match contact.obstacle {
+            Some(_) => VetoReason::BothSidesBlocked,
+            None => VetoReason::SelfCollision,
+        };
+        let by = self.arm.connector_of_link(contact.link);
+        let reached = points[self.k];
+        Some(Veto { by, from: self.k, reason, obstacle: contact.obstacle, reached })
     }
 
     /// Returns valid postures that reach the target, those nearest to the present one first.
@@ -114,7 +148,7 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
     }
 
     fn is_free(&self, posture: &Vec<f64>) -> bool {
-        self.find_veto(&self.arm.connector_positions(posture)).is_none()
+        self.find_veto(posture, &self.arm.connector_positions(posture)).is_none()
     }
 
     fn is_path_free(&self, a: &Vec<f64>, b: &Vec<f64>) -> bool {

@@ -79,7 +79,7 @@ pub struct Joint {
 }
 
 /// A frame in another: rotated by `rpy_rad`, then moved by `xyz_m`.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Origin {
     /// Displacement, in meters.
     pub xyz_m: [f64; 3],

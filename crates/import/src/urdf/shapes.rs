@@ -4,6 +4,7 @@ use super::mesh_files::find_mesh;
 use super::{Model, Origin};
 use crate::mesh::Mesh;
 use crate::{ImportReport, Treatment};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -17,7 +18,7 @@ pub struct Collision {
 }
 
 /// A shape as the model gives it, its center at the origin of its frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Shape {
     /// A ball.
     Sphere {
@@ -56,7 +57,7 @@ pub enum Shape {
 }
 
 /// A shape that takes up space: a ball, a cylinder about z, a box or a convex hull.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Solid {
     /// Index of its link in [`Model::links`].
     pub link: usize,
@@ -66,6 +67,22 @@ pub struct Solid {
     pub center_m: [f64; 3],
     /// The shape; never a mesh.
     pub shape: Shape,
+}
+
+impl Solid {
+    /// Returns whether all of its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let own = self.origin.xyz_m.iter().chain(&self.origin.rpy_rad).chain(&self.center_m);
+        let shape: Vec<f64> = match &self.shape {
+            Shape::Sphere { radius_m } => vec![*radius_m],
+            Shape::Cylinder { radius_m, length_m } => vec![*radius_m, *length_m],
+            Shape::Box { size_m } => size_m.to_vec(),
+            Shape::Hull { points_m } => points_m.concat(),
+            Shape::Mesh { scale, .. } => scale.to_vec(),
+            Shape::Other { .. } => Vec::new(),
+        };
+        own.copied().chain(shape).all(f64::is_finite)
+    }
 }
 
 /// The solids of a model, and what is said of shapes that are not among them.

@@ -13,7 +13,7 @@ use sidestep_scenario::{Bundle, ResolvedScenario, Source};
 use std::path::Path;
 
 /// Keys whose values name files that are stored unchanged.
-const PLAIN_FILE_KEYS: [&str; 3] = ["script_file", "urdf", "srdf"];
+const PLAIN_FILE_KEYS: [&str; 4] = ["script_file", "urdf", "srdf", "joint_limits"];
 
 /// Returns the scenario together with every file that it names.
 ///
@@ -27,6 +27,7 @@ pub(crate) fn resolve_scenario<const D: usize>(
     let mut bundle = Bundle::new(source, compiled.seed, compiled.cycles);
     // Scripts and arms are keys of chains alone.
     add_files_under_key(&mut bundle, &file["chains"], "chains")?;
+    add_solids(&mut bundle, &file["chains"], compiled);
     if let Some(path) = file["ground"]["map"].as_str() {
         add_map_files(&mut bundle, &rosmap::load(&source.path(Path::new(path)))?);
     }
@@ -34,6 +35,24 @@ pub(crate) fn resolve_scenario<const D: usize>(
         add_stage_world_files(&mut bundle, &stage::load(&source.path(Path::new(path)))?);
     }
     bundle.finish()
+}
+
+/// Adds the shapes of links that were read from meshes, which the models only name.
+fn add_solids<const D: usize>(
+    bundle: &mut Bundle<'_>,
+    sections: &Value,
+    compiled: &ChainScenario<D>,
+) {
+    let mut slot = 0;
+    for (k, section) in sections.as_array().into_iter().flatten().enumerate() {
+        let arm = compiled.world.chains.get(slot).and_then(|spec| spec.arm.as_ref());
+        slot += section["count"].as_u64().unwrap_or(1) as usize;
+        let Some(arm) = arm.filter(|arm| !arm.solids.is_empty()) else { continue };
+        let bytes = postcard::to_stdvec(&arm.solids).expect("shapes are plain data");
+        let name = format!("{}-solids.bin", bundle.count());
+        let path = bundle.add(&name, bytes);
+        bundle.set(&format!("chains.{k}.arm.solids"), format_args!("{path:?}"));
+    }
 }
 
 /// Adds all files that are named under a key.

@@ -257,6 +257,19 @@ impl ChainTally {
         self.dropped += traffic.dropped;
     }
 
+    /// Returns the gap of the own body below which it matters how large it is, in meters: an overlap counts in each cycle
+    /// that it lasts, a gap only if it is the least so far. Beyond `look_m` nothing is looked for.
+    pub(crate) fn own_gap_to_find_m(&self, look_m: f64) -> f64 {
+        self.min_own_gap_m.min(look_m).max(0.0)
+    }
+
+    /// Takes the gap of the own body in a cycle, in meters, negative where parts overlap: the least of the run, and the
+    /// depth of an overlap now.
+    pub(crate) fn add_own_gap(&mut self, gap_m: f64) {
+        self.min_own_gap_m = self.min_own_gap_m.min(gap_m);
+        self.own_depth_m = (-gap_m).max(0.0);
+    }
+
     /// Counts a step that left a part in an obstacle, or none; returns whether that is news.
     pub(crate) fn record_inside(&mut self, is_inside: bool) -> bool {
         let was_inside = self.inside_steps > 0;

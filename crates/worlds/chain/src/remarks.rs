@@ -20,9 +20,10 @@ pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark
     // One of them is enough: all chains talk over the same network.
     let slow = chains.find_map(|(k, spec)| slow_network_remark(&compiled.world, k, spec));
     let of_files = ground.chain(files);
-    let overlap = own_overlap_remark(&compiled.world);
-    let of_arms = unlimited.chain(led_slowly);
-    of_files.chain(of_arms).chain(slow).chain(overlap).chain(unused_rules(compiled)).collect()
+    let own_overlap = own_overlap_remark(&compiled.world);
+    let overlaps = chains.clone().filter_map(|(k, spec)| exempt_overlaps_remark(k, spec));
+    let of_arms = unlimited.chain(led_slowly).chain(overlaps);
+    of_files.chain(of_arms).chain(slow).chain(own_overlap).chain(unused_rules(compiled)).collect()
 }
 
 /// Returns a warning on chains whose own parts overlap at the start, where that is allowed.
@@ -35,6 +36,8 @@ fn own_overlap_remark<const D: usize>(world: &ChainWorld<D>) -> Option<Remark> {
         .chains
         .iter()
         .enumerate()
+        // An arm with shapes is told of the links that overlap.
+        .filter(|(_, spec)| spec.arm.as_ref().is_none_or(|arm| arm.body.is_none()))
         .filter_map(|(k, spec)| Some((k, own_overlap_text(&spec.start, &mut tree)?)));
     let (k, words) = overlaps.next()?;
     let more = match overlaps.count() {
@@ -129,6 +132,19 @@ fn unlimited_speeds_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Opt
         "the model gives no velocity for some joints, which are taken to reach: {}; write \
          <limit velocity=\"...\"/> for others",
         taken.join(", ")
+    );
+    Some(Remark::note(format!("chains.{k}.arm"), words))
+}
+
+/// Returns a note on links that overlap at the start, and may therefore touch.
+fn exempt_overlaps_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
+    let arm = spec.arm.as_deref().filter(|arm| !arm.exempt_overlaps.is_empty())?;
+    let pairs = arm.exempt_overlaps.iter();
+    let pairs = pairs.map(|(a, b, depth_m)| format!("`{a}` and `{b}` by {depth_m:.4} m"));
+    let words = format!(
+        "links that overlap at the start may touch during the run: {}; start elsewhere, or name those that may touch \
+         in an SRDF file",
+        pairs.collect::<Vec<_>>().join(", ")
     );
     Some(Remark::note(format!("chains.{k}.arm"), words))
 }

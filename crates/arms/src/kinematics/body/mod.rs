@@ -4,6 +4,7 @@
 //! hull   the convex hulls of meshes
 //! mount  where a link of the model is, at a posture of the arm
 //! pairs  the pairs of parts that must not touch
+//! surroundings  distances from obstacles in the world, and between own parts
 //! ```
 //!
 //! All links of the model count, those beside the arm as well (a second finger, the column that an
@@ -13,15 +14,18 @@
 mod hull;
 mod mount;
 mod pairs;
+mod surroundings;
 #[cfg(test)]
 mod tests;
+
+pub use surroundings::{BodyContact, BodyPosture};
 
 use super::serial::{LinkFrames, SerialChain};
 use super::transform::{Transform, Vector};
 use mount::LinkMountsOnArm;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
 use parry3d_f64::query::{self, Contact};
-use parry3d_f64::shape::{Ball, ConvexPolyhedron, Cuboid, Cylinder, Shape as ParryShape};
+use parry3d_f64::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Cylinder, Shape as ParryShape};
 use sidestep_import::urdf::{Model, Shape, Solid};
 use sidestep_kernel::geometry::norm;
 
@@ -51,6 +55,18 @@ enum ShapeCore {
     Cylinder(Cylinder),
     Box(Cuboid),
     Hull(ConvexPolyhedron),
+    Rod(RodShape),
+}
+
+/// A rod with round ends. The library's own type has no equality.
+#[derive(Debug, Clone)]
+struct RodShape(Capsule);
+
+impl PartialEq for RodShape {
+    fn eq(&self, other: &Self) -> bool {
+        let ends = |rod: &Self| [rod.0.segment.a, rod.0.segment.b].map(point);
+        ends(self) == ends(other) && self.0.radius == other.0.radius
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -97,6 +113,11 @@ impl ArmBody {
     /// Returns whether it has no shapes at all.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
+    }
+
+    /// Returns whether a link that the joints move has a shape.
+    pub fn has_moving_shape(&self) -> bool {
+        self.parts.iter().any(|part| part.mount.link > 0)
     }
 
     /// Returns the number of its parts that are convex hulls of meshes.
@@ -238,6 +259,7 @@ impl ShapeCore {
             Self::Cylinder(cylinder) => cylinder,
             Self::Box(cuboid) => cuboid,
             Self::Hull(hull) => hull,
+            Self::Rod(rod) => &rod.0,
         }
     }
 
@@ -247,6 +269,7 @@ impl ShapeCore {
             Self::Cylinder(c) => norm([c.half_height, c.radius]),
             Self::Box(cuboid) => norm(point(cuboid.half_extents)),
             Self::Hull(hull) => hull.points().iter().map(|p| norm(point(*p))).fold(0.0, f64::max),
+            Self::Rod(rod) => norm(point(rod.0.segment.a)) + rod.0.radius,
         }
     }
 

@@ -25,6 +25,11 @@ struct MimicJoint {
 }
 
 impl LinkMount {
+    /// Returns a frame that is fixed in a link of the arm.
+    pub(super) fn rigid(link: usize, last: Transform) -> Self {
+        Self { link, steps: Vec::new(), last }
+    }
+
     pub(super) fn transform(&self, links: &[Transform], values: &[f64]) -> Transform {
         let start = links[self.link];
         let at = self.steps.iter().fold(start, |at, step| {

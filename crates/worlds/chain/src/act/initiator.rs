@@ -56,7 +56,9 @@ fn request_motion<const D: usize>(
     acting.body.driving.ladder = ladder.memory;
     let beyond = out_of_range_veto(&acting.body.chain, k);
     let (climbed, objection) = climbed.unwrap_or((RecoveryOutcome::Vetoed(beyond), Some(beyond)));
-    if let Some(veto) = &objection {
+    // The chain of an arm with shapes is only a guide: what counts is whether its links can follow.
+    let is_guide = context.spec.arm.as_ref().is_some_and(|arm| arm.body.is_some());
+    if let Some(veto) = objection.as_ref().filter(|_| !is_guide) {
         acting.record_veto(veto);
     }
     climbed

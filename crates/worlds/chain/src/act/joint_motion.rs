@@ -65,6 +65,30 @@ pub(super) fn has_come_to_rest<const D: usize>(body: &ChainBodyState<D>) -> bool
     body.motion.is_at_rest()
 }
 
+/// The least distances of an arm's body.
+pub(super) struct ArmClearance {
+    /// From obstacles, as far as they are looked for, m.
+    pub(super) obstacles_m: f64,
+    /// The connector that stands for the part which is nearest to one.
+    pub(super) connector: usize,
+    /// Between parts that must not touch, up to the least one so far, m.
+    pub(super) own_m: f64,
+}
+
+/// Returns the least distances of an arm with shapes; none of other chains.
+pub(super) fn arm_clearance<const D: usize>(
+    context: ChainContext<'_, D>,
+    body: &ChainBodyState<D>,
+) -> Option<ArmClearance> {
+    let arm = context.spec.arm.as_deref()?;
+    let shapes = arm.body.as_ref()?;
+    let look_m = context.world.look_m;
+    let posture = arm.posture(body.joints.as_ref()?);
+    let (obstacles_m, link) = shapes.clearance_m(posture, context.obstacles, look_m);
+    let own_m = shapes.own_gap_m(posture, body.tally.own_gap_to_find_m(look_m));
+    Some(ArmClearance { obstacles_m, connector: arm.connector_of_link(link), own_m })
+}
+
 /// The check of the cycles in which joints come to rest.
 pub(super) struct StopCheck<'a, const D: usize> {
     pub(super) context: ChainContext<'a, D>,
@@ -98,7 +122,7 @@ impl<const D: usize> StopCheck<'_, D> {
         let mut before: Option<Vec<Point<D>>> = None;
         for posture in self.arm.motion.stop_postures(motion, joints, reference) {
             let points: Vec<Point<D>> = self.arm.connector_positions(&posture);
-            if let Some(veto) = space.find_veto(&points) {
+            if let Some(veto) = space.find_veto(&posture, &points) {
                 return Some(veto);
             }
             if line.as_ref().is_some_and(|line| line.is_left_at(points[self.k])) {

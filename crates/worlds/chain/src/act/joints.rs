@@ -212,7 +212,8 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
         }
         let wanted = TrackingReference { from: &from, guide: Some(&guide), led: &[] };
         let mut best: Option<ArmPosture<D>> = None;
-        let mut least_m = self.clearance_m(&from);
+        let joints = self.joints.clone();
+        let mut least_m = self.clearance_m(&joints, &from);
         let mut part = 1.0;
         for _ in 0..MAX_ESCAPE_TRIES {
             let posed = self.solve_posture(&wanted, part);
@@ -220,7 +221,7 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
                 best = Some(posed);
                 break;
             };
-            let clearance_m = self.clearance_m(&posed.points);
+            let clearance_m = self.clearance_m(&posed.joints, &posed.points);
             if veto.reason == VetoReason::BothSidesBlocked && clearance_m > least_m {
                 least_m = clearance_m;
                 best = Some(posed);
@@ -302,7 +303,7 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
         let is_solid = world.rules.self_collision;
         let present = JointPosture { arm: self.arm, joints: self.joints };
         let space = JointSpace::new(present, self.chain, obstacles, is_solid, k);
-        if let Some(veto) = space.find_veto(&posed.points) {
+        if let Some(veto) = space.find_veto(&posed.joints, &posed.points) {
             return Some(veto);
         }
         let (by, id) = self.find_tunneling(from, posed)?;
@@ -329,9 +330,12 @@ impl<'a, const D: usize> ArmJointSolver<'a, D> {
         passed.map(|passed| (passed.rod + 1, passed.obstacle))
     }
 
-    /// Returns the least clearance that the chain has, or would have, at some places.
-    fn clearance_m(&mut self, points: &[Point<D>]) -> f64 {
+    /// Returns the least clearance that the arm has, or would have, in a posture that puts its connectors there.
+    fn clearance_m(&mut self, joints: &[f64], points: &[Point<D>]) -> f64 {
         let ChainContext { world, obstacles, .. } = self.context;
+        if let Some(body) = &self.arm.body {
+            return body.clearance_m(self.arm.posture(joints), obstacles, world.look_m).0;
+        }
         let was = self.chain.points().to_vec();
         self.chain.points_mut().copy_from_slice(points);
         let (least_m, _) = min_clearance(self.chain, obstacles, world.look_m, true);

@@ -1,9 +1,10 @@
 //! Measures of a chain at the end of each of its cycles.
 
+use super::joint_motion::arm_clearance;
 use super::{ChainContext, ChainCycleState};
 use crate::clearance::min_clearance;
 use crate::events::EventKind;
-use crate::metrics::{ChainTally, PENETRATION_THRESHOLD_M};
+use crate::metrics::PENETRATION_THRESHOLD_M;
 use sidestep_rods::geometry::distance;
 use sidestep_rods::{Chain, RodBvh, nearest_own_parts};
 
@@ -25,6 +26,7 @@ pub(super) fn measure_chain<const D: usize>(
 ) {
     let ChainContext { world, now, obstacles, .. } = context;
     let look_m = world.look_m;
+    let arm = arm_clearance(context, acting.body);
     let chain = &acting.body.chain;
     let tally = &mut acting.body.tally;
     tally.steps += 1;
@@ -41,9 +43,16 @@ pub(super) fn measure_chain<const D: usize>(
     let interval = MEASURE_INTERVAL_CYCLES * rods.div_ceil(RODS_PER_INTERVAL) as u64;
     let is_due = rods <= MAX_MEASURED_RODS || now.is_multiple_of(interval);
     if is_whole && is_due && world.rules.self_collision {
-        measure_own_body(chain, tally, own, look_m);
+        let gap_m = match &arm {
+            Some(arm) => arm.own_m,
+            None => own_gap_m(chain, own, tally.own_gap_to_find_m(look_m)),
+        };
+        tally.add_own_gap(gap_m);
     }
-    let (least_m, part) = min_clearance(chain, obstacles, look_m, is_whole);
+    let (least_m, part) = match &arm {
+        Some(arm) => (arm.obstacles_m, arm.connector),
+        None => min_clearance(chain, obstacles, look_m, is_whole),
+    };
     if least_m < look_m {
         tally.min_clearance_m = tally.min_clearance_m.min(least_m);
     }
@@ -56,17 +65,7 @@ pub(super) fn measure_chain<const D: usize>(
     }
 }
 
-/// Measures the gap of a chain to itself: the least of the run, and the depth of an overlap now.
-fn measure_own_body<const D: usize>(
-    chain: &Chain<D>,
-    tally: &mut ChainTally,
-    own: &mut RodBvh<D>,
-    look_m: f64,
-) {
-    // An overlap counts in each cycle that it lasts, a gap only if it is the least so far.
-    let within_m = tally.min_own_gap_m.min(look_m).max(0.0);
-    let nearest = nearest_own_parts(chain, own, within_m);
-    let gap_m = nearest.map_or(f64::INFINITY, |nearest| nearest.gap_m);
-    tally.min_own_gap_m = tally.min_own_gap_m.min(gap_m);
-    tally.own_depth_m = (-gap_m).max(0.0);
+/// Returns the gap of a chain to itself in meters, negative where parts overlap; infinite if it is more than `within_m`.
+fn own_gap_m<const D: usize>(chain: &Chain<D>, own: &mut RodBvh<D>, within_m: f64) -> f64 {
+    nearest_own_parts(chain, own, within_m).map_or(f64::INFINITY, |nearest| nearest.gap_m)
 }

@@ -21,6 +21,9 @@ use std::collections::VecDeque;
 const MIN_FRACTION: f64 = 1e-6;
 /// Bisections of a straight piece of an arm's path: to a millionth of it, less than rounding of what a cycle allows.
 const BISECTIONS: usize = 20;
+/// Fraction of its tolerance within which a tool keeps to a line: the rest is for the line itself, which is measured by the
+/// references on it.
+const LINE_FRACTION: f64 = 0.9;
 /// Shares of a cycle's step that are tried, each half of the one before.
 const MAX_STEP_TRIES: usize = 5;
 /// Fraction of the speed limit that a shortened step aims at: by exactly the limit, rounding could exceed it again.
@@ -208,7 +211,9 @@ fn follow_joint_path<const D: usize>(
 /// Returns how far the tool may leave the line on which the present task leads it, if it does.
 fn line_tolerance_m<const D: usize>(initiator: Initiator<'_, D>) -> Option<f64> {
     match &initiator.task.driver {
-        TaskKind::Targets(targets) if targets.path == TargetPath::Line => Some(targets.tolerance_m),
+        TaskKind::Targets(targets) if targets.path == TargetPath::Line => {
+            Some(LINE_FRACTION * targets.tolerance_m)
+        }
         _ => None,
     }
 }

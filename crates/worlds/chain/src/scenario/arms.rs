@@ -4,15 +4,21 @@ use super::{ChainScenarioCompiler, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
-use sidestep_arms::kinematics::{SerialChain, Transform};
+use sidestep_arms::kinematics::{ArmBody, SerialChain, Transform};
 use sidestep_arms::motion::{MotionFilter, joint_rates};
 use sidestep_import::report::Finding;
 use sidestep_import::urdf::joint_limits::{self, GivenRates, JointRates};
 use sidestep_import::urdf::srdf::Semantics;
-use sidestep_import::urdf::{Model, Origin};
+use sidestep_import::urdf::{Model, Origin, Shape, Solid, Solids};
 use sidestep_kernel::InputError;
 use sidestep_scenario::Spanned;
+use std::collections::BTreeSet;
 use std::ops::Range;
+
+/// Name of a model that stands in the scenario itself; its meshes are beside the scenario.
+const URDF_TEXT: &str = "urdf_text";
+/// Radius of rods where a link of an arm with shapes has none, m: a line that is seen by queries of distance.
+const THIN_ROD_M: f64 = 1e-3;
 
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -41,6 +47,20 @@ pub(super) struct ArmSection {
     max_jerk: Option<PositiveNumber>,
     /// The tool that the tip carries.
     pub(super) tool: Option<ToolSection>,
+    /// What of it must not touch anything.
+    body: Option<BodyWord>,
+    /// File of the shapes of its links as they were read, which a recorded run keeps in place of meshes.
+    solids: Option<String>,
+}
+
+/// What of an arm must not touch anything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+enum BodyWord {
+    /// Rods and connectors of the radii of its chain.
+    Rods,
+    /// The collision shapes of its links, and rods where a link has none.
+    Shapes,
 }
 
 /// A tool on the tip of an arm, and its load.
@@ -133,7 +153,85 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let given = self.joint_limits(s, &serial, at)?;
         let rates = joint_rates(&serial, &given, s.highest_rates());
         let motion = MotionFilter::new(rates, self.dt_s());
-        Ok(Arm { findings, ..Arm::new(serial, at_m, values, motion) })
+        let arm = Arm::new(serial, at_m, values, motion);
+        let may_touch = |links: &BTreeSet<usize>| match &semantics {
+            Some(semantics) => semantics.may_touch(links),
+            None => Vec::new(),
+        };
+        let arm = self.with_body(section, &model, arm, may_touch)?;
+        findings.extend(arm.findings.iter().cloned());
+        Ok(Arm { findings, ..arm })
+    }
+
+    /// Returns an arm with the shapes of its links, if some of those that move have any and they are not left out. Its
+    /// findings are what was said of shapes.
+    fn with_body(
+        &self,
+        section: &Spanned<ArmSection>,
+        model: &Model,
+        arm: Arm,
+        may_touch: impl Fn(&BTreeSet<usize>) -> Vec<(usize, usize)>,
+    ) -> Result<Arm, InputError> {
+        let s = section.get_ref();
+        let at = section.span();
+        if s.body == Some(BodyWord::Rods) {
+            let unused = [("solids", s.solids.is_some(), false)];
+            self.source.refuse_unused_keys(at, &unused, "with body = \"rods\"")?;
+            return Ok(arm);
+        }
+        let read = match &s.solids {
+            Some(file) => {
+                Solids { solids: self.solids_file(file, model, at.clone())?, ..Solids::default() }
+            }
+            None => {
+                model.solids(&self.source.path(s.urdf.as_deref().unwrap_or(URDF_TEXT).as_ref()))
+            }
+        };
+        let links: BTreeSet<usize> = read.solids.iter().map(|solid| solid.link).collect();
+        let body = ArmBody::new(model, &arm.serial, &read.solids, &may_touch(&links));
+        if !body.has_moving_shape() {
+            if s.body == Some(BodyWord::Shapes) {
+                let at = self.source.key_span(at, &["body"]);
+                let cause = "no link of the arm that moves has a collision shape";
+                return Err(self.source.error(at, cause, "leave body out: its rods count"));
+            }
+            return Ok(arm);
+        }
+        let tool = s.tool.as_ref();
+        let radii_m = [tool.and_then(|t| t.radius_m), tool.and_then(|t| t.load_radius_m)];
+        let body = body.with_rods(&arm.serial, &arm.skeleton, THIN_ROD_M).with_tool(
+            &arm.serial,
+            &arm.skeleton,
+            radii_m.map(|radius| radius.map(f64::from)),
+        );
+        let has_meshes = read.solids.iter().any(|solid| matches!(solid.shape, Shape::Hull { .. }));
+        // A recorded run has the model's text, but not its meshes.
+        let solids = if has_meshes { read.solids } else { Vec::new() };
+        let findings = read.report.findings;
+        Ok(Arm { findings, solids, ..arm.with_body(body) })
+    }
+
+    /// Returns the shapes that a recorded run has kept.
+    fn solids_file(
+        &self,
+        file: &str,
+        model: &Model,
+        at: Range<usize>,
+    ) -> Result<Vec<Solid>, InputError> {
+        let path = self.source.path(file.as_ref());
+        let bytes = std::fs::read(&path).map_err(|error| {
+            let remedy = "give a readable file, or leave solids out";
+            let at = self.source.key_span(at.clone(), &["solids"]);
+            self.source.error(at, format!("{}: {error}", path.display()), remedy)
+        })?;
+        let solids: Option<Vec<Solid>> = postcard::from_bytes(&bytes).ok();
+        let fits = |solid: &Solid| solid.link < model.links.len() && solid.is_finite();
+        solids.filter(|solids| solids.iter().all(fits)).ok_or_else(|| {
+            let cause = format!("{} holds no shapes of this model", path.display());
+            let remedy = "leave solids out: the shapes are then read from the model";
+            let at = self.source.key_span(at, &["solids"]);
+            self.source.error(at, cause, remedy)
+        })
     }
 
     /// Returns the link that a key names; errors point at that key.

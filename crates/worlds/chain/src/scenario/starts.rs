@@ -4,6 +4,7 @@ use super::super::metrics::PENETRATION_THRESHOLD_M;
 use super::super::world::{ChainSpec, OTHER_CHAIN, push_part_obstacles};
 use super::obstacles::ScenarioObstacles;
 use super::{ChainScenarioCompiler, MIN_REACH_M};
+use sidestep_arms::Arm;
 use sidestep_kernel::{EntitySlot, InputError};
 use sidestep_rods::geometry::Aabb;
 use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh, nearest_own_parts};
@@ -33,7 +34,11 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let moving: Vec<_> = ground.movers.at(0.0).filter(Obstacle::is_in_range).collect();
         obstacles.replace_moving(&moving)?;
         for (slot, spec) in chains.iter().enumerate() {
-            if let Some(inside) = deepest(&spec.start, &obstacles, None) {
+            let inside = match spec.arm.as_deref().filter(|arm| arm.body.is_some()) {
+                Some(arm) => deepest_link(arm, &obstacles),
+                None => deepest(&spec.start, &obstacles, None),
+            };
+            if let Some(inside) = inside {
                 return Err(self.start_overlap_error(
                     slot,
                     inside,
@@ -107,6 +112,15 @@ pub(crate) fn own_overlap_text<const D: usize>(
     let nearest = nearest_own_parts(chain, tree, -PENETRATION_THRESHOLD_M)?;
     let [one, other] = nearest.parts;
     Some(format!("begins with its {one} {:.3e} m deep in its {other}", -nearest.gap_m))
+}
+
+/// Returns the link of an arm with shapes that is deepest in an obstacle.
+fn deepest_link<const D: usize>(arm: &Arm, obstacles: &Obstacles<D>) -> Option<StartOverlap> {
+    let body = arm.body.as_ref()?;
+    let contact = body.deepest_contact(arm.posture(&arm.values), obstacles, false)?;
+    let connector = arm.connector_of_link(contact.link);
+    let inside = StartOverlap { connector, id: contact.obstacle?, depth_m: contact.depth_m };
+    (inside.depth_m > PENETRATION_THRESHOLD_M).then_some(inside)
 }
 
 /// Returns the part of a chain that is deepest in anything not called `own`.

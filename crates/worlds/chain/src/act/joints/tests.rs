@@ -8,6 +8,7 @@ use sidestep_import::urdf::Model;
 use sidestep_kernel::geometry::{distance, norm, normalized, perpendicular_component, sub};
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
 use sidestep_kernel::{Seed, Simulation};
+use sidestep_rods::{Obstacle, Obstacles};
 use sidestep_scenario::Source;
 use sidestep_testing::{ROBOT_MODELS, robot_model, root};
 use std::path::Path;
@@ -278,4 +279,92 @@ fn what_only_a_tool_can_do_is_refused_elsewhere_with_a_remedy() {
         let (cause, remedy) = cause(&task);
         assert!(remedy.contains(words), "{task}: {cause}; {remedy}");
     }
+}
+
+/// A planar arm of three links with boxes for shapes.
+fn boxed() -> String {
+    let link = |k: usize, length: f64| {
+        format!(
+            "<link name='l{k}'><collision><origin xyz='{} 0 0'/><geometry><box size='{length} 0.1 0.1'/></geometry>\
+             </collision></link>",
+            0.5 * length
+        )
+    };
+    let joint = |k: usize, x: f64| {
+        format!(
+            "<joint name='j{k}' type='revolute'><parent link='l{}'/><child link='l{k}'/><origin xyz='{x} 0 0'/>\
+             <axis xyz='0 0 1'/><limit lower='-2.5' upper='2.5' velocity='1.5'/></joint>",
+            k - 1
+        )
+    };
+    format!(
+        "<robot name='boxed'>{}{}{}{}{}{}{}<link name='tool'/><joint name='t' type='fixed'><parent link='l3'/>\
+         <child link='tool'/><origin xyz='0.3 0 0'/></joint></robot>",
+        link(0, 0.1),
+        link(1, 0.4),
+        link(2, 0.4),
+        link(3, 0.3),
+        joint(1, 0.0),
+        joint(2, 0.4),
+        joint(3, 0.4)
+    )
+}
+
+/// Returns a run of the arm of boxes among obstacles, with radii of rods that its boxes do not have.
+fn boxed_run(more: &str, rest: &str, task: &str) -> ChainRun<3> {
+    let text = format!(
+        "format = 1\nworld = \"chain\"\ncycles = 20000\n[chain]\ndimensions = 3\n{rest}\n[[chains]]\n\
+         arm = {{ urdf_text = \"\"\"{}\"\"\", joints = [0.3, 0.5, 0.4]{more} }}\nradius_m = 0.2\nrod_radius_m = 0.15\n\
+         [[chains.tasks]]\n{task}",
+        boxed()
+    );
+    let source = Source::new("s.toml", &text, root());
+    ChainScenario::<3>::new(&source).expect("valid").start(&source, 1)
+}
+
+/// Beside a wall that rods of the radius of its chain would be in.
+#[test]
+fn the_links_of_an_arm_are_what_must_not_touch() {
+    let wall = "[[obstacles]]\nat_m = [0.2, 0.65, 0.0]\nsize_m = [0.6, 0.05, 0.4]";
+    let task = "kind = \"targets\"\nconnector = 3\ntargets_m = [[0.55, 0.55, 0.0], [0.8, -0.3, 0.0]]\nspeed_m_s = 0.3";
+    let mut run = boxed_run("", wall, task);
+    let arm = run.world().chains[0].arm.clone().expect("an arm");
+    let body = arm.body.clone().expect("shapes");
+    let mut least_m = f64::INFINITY;
+    while run.cycle() < 5000 && !run.is_over() {
+        run.advance(1);
+        let now = joints(&run);
+        let (clearance_m, _) = body.clearance_m(arm.posture(&now), &run.world().obstacles, 0.5);
+        least_m = least_m.min(clearance_m);
+    }
+    assert_all_is_reached(&run, "boxes");
+    assert!(least_m > -1e-9 && least_m < 0.15, "{least_m}");
+    let tally = run.world().chain_metrics(run.state(), 0).tally;
+    assert!((tally.min_clearance_m - least_m).abs() < 1e-9, "{}", tally.min_clearance_m);
+    assert_eq!(tally.penetrations, 0);
+    // As rods of that radius it overlaps the wall at the start already.
+    let text = format!(
+        "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n{wall}\n[[chains]]\narm = {{ urdf_text = \"\"\"{}\"\"\", \
+         joints = [0.3, 0.5, 0.4], body = \"rods\" }}\nradius_m = 0.2\nrod_radius_m = 0.15\n[[chains.tasks]]\n{task}",
+        boxed()
+    );
+    let source = Source::new("s.toml", &text, root());
+    assert!(ChainScenario::<3>::new(&source).is_err());
+}
+
+#[test]
+fn a_tool_and_its_load_are_parts_of_an_arm() {
+    let rest = "kind = \"rest\"\nlasts_s = 0.1";
+    let tool = ", tool = { xyz_m = [0.2, 0.0, 0.0], radius_m = 0.02, load_radius_m = 0.06 }";
+    let run = boxed_run(tool, "", rest);
+    let arm = run.world().chains[0].arm.clone().expect("an arm");
+    let body = arm.body.clone().expect("shapes");
+    let tip = run.state().body(0).chain.points()[3];
+    let bare = boxed_run("", "", rest).state().body(0).chain.points()[3];
+    assert!((distance(tip, bare) - 0.2).abs() < 1e-12);
+    // A wall 0.1 m from the tool's point, which its load comes within 0.04 m of.
+    let wall = Obstacle::ball(7, [tip[0], tip[1], 1.1], 1.0);
+    let obstacles = Obstacles::new(vec![wall], 1.0).expect("valid");
+    let (clearance_m, link) = body.clearance_m(arm.posture(&arm.values), &obstacles, 0.5);
+    assert!((clearance_m - 0.04).abs() < 1e-6 && link == 3, "{clearance_m}");
 }
