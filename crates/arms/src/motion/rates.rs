@@ -10,6 +10,9 @@ const DEFAULT_SPEED_M_S: f64 = 1.0;
 /// Time in which a joint without a given acceleration reaches its highest speed, s. The data sheet of the Panda allows
 /// 0.10 to 0.29 s by joint; with 0.3 s each of its joints stays within it.
 const DEFAULT_SPEED_UP_S: f64 = 0.3;
+/// Highest acceleration of such joints, rad/s2 or m/s2: that of `MoveIt` for joints without one. Models have speeds of 10 rad/s
+/// and more where nobody knew them.
+const MAX_DEFAULT_ACCELERATION: f64 = 10.0;
 /// Time in which a joint without a given jerk reaches its highest acceleration, s. Drives of arms allow some
 /// milliseconds; this is a quarter of the period of the first resonance of arms, about 6 Hz, which a profile excites
 /// less the longer this time is.
@@ -36,7 +39,8 @@ impl JointRates {
         };
         let speed = lower(given.speed, at_most.speed).unwrap_or(default_speed);
         let acceleration = lower(given.acceleration, at_most.acceleration);
-        let acceleration = acceleration.unwrap_or(speed / DEFAULT_SPEED_UP_S);
+        let usual = (speed / DEFAULT_SPEED_UP_S).min(MAX_DEFAULT_ACCELERATION);
+        let acceleration = acceleration.unwrap_or(usual);
         let jerk = lower(given.jerk, at_most.jerk).unwrap_or(acceleration / DEFAULT_JERK_S);
         Self { speed, acceleration, jerk }
     }

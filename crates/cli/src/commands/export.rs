@@ -21,7 +21,7 @@ Examples:
   sidestep export runs/office --to mcap --every 10  for Foxglove
   sidestep export runs/hall --to lorr               for PlanViz of the League
   sidestep export runs/office --to rosbag           odometry and scans for ROS 2
-  sidestep export runs/reacher --to trajectory      motions of arms: ROS 2, CSV and JSON
+  sidestep export runs/reacher --to trajectory      motions of arms for ROS 2
   sidestep export runs/office --to gif --from 1000 --until 2000
   sidestep export runs/office --to png --from 1234  one moment
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg

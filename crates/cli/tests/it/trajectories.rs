@@ -139,3 +139,48 @@ fn a_bag_of_a_chain_of_robots_has_each_of_them() {
     }
     assert!(frames.contains(&json!(["robot_0_0/base_link", "robot_0_0/laser"])), "{frames:?}");
 }
+
+/// The links of this arm are meshes, which a recorded run keeps as it read them.
+#[test]
+fn an_arm_of_meshes_is_computed_again_without_them() {
+    let place = TestFolder::new();
+    let corners = [[0.0, -0.05, -0.05], [0.4, 0.0, -0.05], [0.0, 0.05, -0.05], [0.2, 0.0, 0.05]];
+    let faces = [[0, 1, 2], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    let facet = |face: [usize; 3]| {
+        let vertices = face.map(|k| {
+            let [x, y, z] = corners[k];
+            format!("vertex {x} {y} {z}\n")
+        });
+        format!("facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n", vertices.concat())
+    };
+    let facets = faces.map(facet).concat();
+    std::fs::create_dir_all(place.path("arm/meshes")).expect("a folder");
+    std::fs::create_dir_all(place.path("arm/urdf")).expect("a folder");
+    place.write("arm/meshes/link.stl", format!("solid link\n{facets}endsolid link\n"));
+    let link = |k: usize| {
+        format!(
+            "<link name='l{k}'><collision><geometry><mesh filename='../meshes/link.stl'/></geometry></collision></link>\
+             <joint name='j{k}' type='revolute'><parent link='l{}'/><child link='l{k}'/><origin xyz='{} 0 0'/>\
+             <axis xyz='0 0 1'/><limit lower='-2.5' upper='2.5' velocity='1.5'/></joint>",
+            k - 1,
+            if k == 1 { 0.0 } else { 0.4 }
+        )
+    };
+    let urdf = format!(
+        "<robot name='m'><link name='l0'/>{}{}{}<link name='tool'/><joint name='t' type='fixed'><parent link='l3'/>\
+         <child link='tool'/><origin xyz='0.4 0 0'/></joint></robot>",
+        link(1),
+        link(2),
+        link(3)
+    );
+    place.write("arm/urdf/arm.urdf", urdf);
+    let text = "format = 1\nworld = \"chain\"\ncycles = 60\n[chain]\ndimensions = 3\n[[obstacles]]\nat_m = [0.5, 0.9, 0.0]\n\
+                radius_m = 0.1\n[[chains]]\narm = { urdf = \"arm/urdf/arm.urdf\", joints = [0.2, 0.5, 0.5], \
+                body = \"shapes\" }\nradius_m = 0.02\n[[chains.tasks]]\nkind = \"targets\"\nconnector = 3\n\
+                targets_m = [[0.9, 0.3, 0.0]]\n";
+    place.write("m.toml", text);
+    place.json(&["run", "m.toml", "--out", "r"]);
+    std::fs::remove_dir_all(place.path("arm")).expect("removed");
+    let again = place.run(&["replay", "r"]);
+    assert_eq!(again.code(), 0, "{}", again.err());
+}

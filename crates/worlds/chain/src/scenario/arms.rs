@@ -12,11 +12,14 @@ use sidestep_import::urdf::srdf::Semantics;
 use sidestep_import::urdf::{Model, Origin, Shape, Solid, Solids};
 use sidestep_kernel::InputError;
 use sidestep_scenario::Spanned;
+use sidestep_scenario::file::read_bytes;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Name of a model that stands in the scenario itself; its meshes are beside the scenario.
 const URDF_TEXT: &str = "urdf_text";
+/// Largest size of a file of shapes, in bytes: a million points of hulls.
+const MAX_SOLIDS_BYTES: u64 = 24 << 20;
 /// Radius of rods where a link of an arm with shapes has none, m: a line that is seen by queries of distance.
 const THIN_ROD_M: f64 = 1e-3;
 
@@ -219,11 +222,8 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         at: Range<usize>,
     ) -> Result<Vec<Solid>, InputError> {
         let path = self.source.path(file.as_ref());
-        let bytes = std::fs::read(&path).map_err(|error| {
-            let remedy = "give a readable file, or leave solids out";
-            let at = self.source.key_span(at.clone(), &["solids"]);
-            self.source.error(at, format!("{}: {error}", path.display()), remedy)
-        })?;
+        let bytes = read_bytes(&path, MAX_SOLIDS_BYTES);
+        let bytes = self.source.with_file_key(at.clone(), "solids", bytes)?;
         let solids: Option<Vec<Solid>> = postcard::from_bytes(&bytes).ok();
         let fits = |solid: &Solid| solid.link < model.links.len() && solid.is_finite();
         solids.filter(|solids| solids.iter().all(fits)).ok_or_else(|| {
