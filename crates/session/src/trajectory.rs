@@ -117,8 +117,8 @@ impl JointRows {
     }
 }
 
-/// Returns speed and acceleration of each joint at a point: of the parabola through it and its neighbors, of the straight
-/// line to the only neighbor at either end, and 0 of a single point.
+/// Returns speed and acceleration of each joint at a point: of the parabola through it and its neighbors, of the
+/// straight line to the only neighbor at either end, and 0 of a single point.
 fn rates_at(times_s: &[f64], positions: &[Vec<f64>], i: usize) -> Vec<[f64; 2]> {
     let slope = |a: usize, b: usize, joint: usize| {
         (positions[b][joint] - positions[a][joint]) / (times_s[b] - times_s[a])

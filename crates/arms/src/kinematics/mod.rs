@@ -18,9 +18,9 @@
 //! constant distance: a rod of fixed length. Two on either side of a prismatic joint have the
 //! distance sqrt(offset^2 + (a + q)^2): a rod of variable length.
 //!
-//! A point says nothing about the twist of a rod about itself. [`recover_joint_values`](SerialChain::recover_joint_values)
-//! reports which joints that leaves open, and refuses with a reason if points do not determine the
-//! joints at all.
+//! A point says nothing about the twist of a rod about itself.
+//! [`recover_joint_values`](SerialChain::recover_joint_values) reports which joints that leaves open, and refuses with
+//! a reason if points do not determine the joints at all.
 
 mod arm_selection;
 mod bend;

@@ -13,12 +13,13 @@
 //!
 //! ```text
 //! |q_k - q_{k-1}| / dt                       <= V               if all |r_k - r_{k-1}| <= V dt
-//! |second difference of q| / dt^2            <= A               if all |(r_k - r_{k-1}) - (r_{k-N} - r_{k-N-1})| <= A N dt^2
+//! |second difference of q| / dt^2            <= A               if all |(r_k - r_{k-1}) - (r_{k-N} - r_{k-N-1})| <= A
+//! N dt^2
 //! |third difference of q| / dt^3             <= 2 A / (M dt)    always
 //! ```
 //!
-//! A reference that rests satisfies the second condition as long as V <= A N dt, so it may always stop. At constant speed
-//! from rest to rest the result is the profile of seven segments of constant jerk, sampled. All joints share the
+//! A reference that rests satisfies the second condition as long as V <= A N dt, so it may always stop. At constant
+//! speed from rest to rest the result is the profile of seven segments of constant jerk, sampled. All joints share the
 //! windows, so each posture is a weighted mean of recent references: inside the joints' ranges, at the reference once
 //! that has rested for N + M - 2 cycles, and near the reference's path before.
 //!
@@ -61,6 +62,15 @@ pub struct MotionState {
     speeds: Vec<f64>,
     /// Acceleration of each joint between the last two cycles, rad/s2 or m/s2.
     accelerations: Vec<f64>,
+}
+
+/// What a cycle does to an arm's joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionStep {
+    /// Their values at its end, rad or m.
+    pub joints: Vec<f64>,
+    /// The magnitudes of the rates of each.
+    pub rates: Vec<JointRates>,
 }
 
 impl MotionFilter {
@@ -162,17 +172,16 @@ impl MotionFilter {
             .collect()
     }
 
-    /// Advances the joints by a cycle in which the reference goes to `reference`; returns their new values, and the
-    /// magnitudes of the rates of each joint.
+    /// Advances the joints by a cycle in which the reference goes to `reference`.
     pub fn advance(
         &self,
         state: &mut MotionState,
         joints: &[f64],
         reference: &[f64],
-    ) -> (Vec<f64>, Vec<JointRates>) {
+    ) -> MotionStep {
         if state.is_at_rest() && reference == joints {
             let still = JointRates { speed: 0.0, acceleration: 0.0, jerk: 0.0 };
-            return (joints.to_vec(), vec![still; joints.len()]);
+            return MotionStep { joints: joints.to_vec(), rates: vec![still; joints.len()] };
         }
         state.push(joints, reference.to_vec(), self.history_len());
         let next = self.smoothed(state);
@@ -190,7 +199,7 @@ impl MotionFilter {
             state.accelerations[i] = acceleration;
         }
         state.clear_if_still(&next);
-        (next, rates)
+        MotionStep { joints: next, rates }
     }
 
     /// References that conditions or means look back to: N + 1 for the step that leaves the first window.
@@ -198,8 +207,8 @@ impl MotionFilter {
         self.weights.len().max(self.speed_window + 1)
     }
 
-    /// Returns the weighted mean of the references. It is taken from the newest, so that it is that one exactly once all
-    /// are equal.
+    /// Returns the weighted mean of the references. It is taken from the newest, so that it is that one exactly once
+    /// all are equal.
     fn smoothed(&self, state: &MotionState) -> Vec<f64> {
         let newest = &state.references[0];
         let mut posture = newest.clone();
@@ -228,8 +237,8 @@ impl MotionState {
         self.references.back().map_or(joints, Vec::as_slice)
     }
 
-    /// Returns all of it as rows of one value for each joint: speeds, accelerations, and references, the newest first; none
-    /// where it is at rest.
+    /// Returns all of it as rows of one value for each joint: speeds, accelerations, and references, the newest first;
+    /// none where it is at rest.
     pub fn to_rows(&self) -> Vec<Vec<f64>> {
         if self.is_at_rest() {
             return Vec::new();

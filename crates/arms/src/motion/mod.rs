@@ -10,5 +10,5 @@ mod rates;
 #[cfg(test)]
 mod tests;
 
-pub use filter::{MotionFilter, MotionState};
+pub use filter::{MotionFilter, MotionState, MotionStep};
 pub use rates::{JointRates, joint_rates};

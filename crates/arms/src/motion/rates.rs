@@ -10,8 +10,8 @@ const DEFAULT_SPEED_M_S: f64 = 1.0;
 /// Time in which a joint without a given acceleration reaches its highest speed, s. The data sheet of the Panda allows
 /// 0.10 to 0.29 s by joint; with 0.3 s each of its joints stays within it.
 const DEFAULT_SPEED_UP_S: f64 = 0.3;
-/// Highest acceleration of such joints, rad/s2 or m/s2: that of `MoveIt` for joints without one. Models have speeds of 10 rad/s
-/// and more where nobody knew them.
+/// Highest acceleration of such joints, rad/s2 or m/s2: that of `MoveIt` for joints without one. Models have speeds of
+/// 10 rad/s and more where nobody knew them.
 const MAX_DEFAULT_ACCELERATION: f64 = 10.0;
 /// Time in which a joint without a given jerk reaches its highest acceleration, s. Drives of arms allow some
 /// milliseconds; this is a quarter of the period of the first resonance of arms, about 6 Hz, which a profile excites
@@ -30,8 +30,8 @@ pub struct JointRates {
 }
 
 impl JointRates {
-    /// Returns the rates of a joint: those that are given, with the model's speed where none is, or else defaults; all up
-    /// to those of `at_most`.
+    /// Returns the rates of a joint: those that are given, with the model's speed where none is, or else defaults; all
+    /// up to those of `at_most`.
     fn from_given(given: GivenRates, at_most: GivenRates, motion: JointMotionKind) -> Self {
         let default_speed = match motion {
             JointMotionKind::Turn => DEFAULT_SPEED_RAD_S,
@@ -68,8 +68,8 @@ fn lower(given: Option<f64>, at_most: Option<f64>) -> Option<f64> {
     given.into_iter().chain(at_most).reduce(f64::min)
 }
 
-/// Returns the highest rates of each variable of an arm: `given` by the name of a joint, else of the model, else defaults; all
-/// up to those of `at_most`. Joints that mimic a variable narrow its rates.
+/// Returns the highest rates of each variable of an arm: `given` by the name of a joint, else of the model, else
+/// defaults; all up to those of `at_most`. Joints that mimic a variable narrow its rates.
 pub fn joint_rates(
     chain: &SerialChain,
     given: &RatesByName,

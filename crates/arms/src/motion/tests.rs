@@ -8,11 +8,14 @@ fn rates(speed: f64, acceleration: f64, jerk: f64) -> JointRates {
 }
 
 /// The position at time `t` of a motion from rest to rest by seven segments of constant jerk: in closed form, with the
-/// durations of its acceleration (`ramp`), of its changes of acceleration (`jerk_s`) and of its start to the start of its
-/// braking (`cruise`).
+/// durations of its acceleration (`ramp`), of its changes of acceleration (`jerk_s`) and of its start to the start of
+/// its braking (`cruise`).
 fn seven_segments(speed: f64, [ramp, jerk_s, cruise]: [f64; 3], t: f64) -> f64 {
     let jerk = speed / (ramp * jerk_s);
-    let cube = |from: f64| (t - from).max(0.0).powi(3) / 6.0;
+    let cube = |from: f64| {
+        let since = (t - from).max(0.0);
+        since * since * since / 6.0
+    };
     let mut position = 0.0;
     for (from, sign) in [(0.0, 1.0), (jerk_s, -1.0), (ramp, -1.0), (ramp + jerk_s, 1.0)] {
         position += sign * jerk * (cube(from) - cube(from + cruise));
@@ -28,7 +31,7 @@ fn lead(filter: &MotionFilter, to: f64) -> Vec<f64> {
     let unlimited = [[f64::NEG_INFINITY, f64::INFINITY]];
     loop {
         let [lower, upper] = filter.reference_ranges(&state, &joints, &unlimited)[0];
-        (joints, _) = filter.advance(&mut state, &joints, &[to.clamp(lower, upper)]);
+        joints = filter.advance(&mut state, &joints, &[to.clamp(lower, upper)]).joints;
         if state.is_at_rest() {
             return positions;
         }
@@ -112,7 +115,7 @@ proptest! {
             let to = if share > 0.0 { last + share * (upper - last) } else { last - share * (lower - last) };
             let stops = filter.stop_postures(&state, &joints, &[to]);
             prop_assert_eq!(&stops[stops.len() - 1], &vec![to]);
-            let (next, used) = filter.advance(&mut state, &joints, &[to]);
+            let MotionStep { joints: next, rates: used } = filter.advance(&mut state, &joints, &[to]);
             prop_assert_eq!(&next, &stops[0]);
             prop_assert!(used[0].speed <= speed && used[0].acceleration <= acceleration && used[0].jerk <= jerk,
                 "{:?} beyond {:?}", used[0], allowed);

@@ -1,5 +1,5 @@
-//! Goals of an arm beyond a place of a connector: a pose of its tool, or values of its joints; and straight lines of the
-//! tool.
+//! Goals of an arm beyond a place of a connector: a pose of its tool, or values of its joints; and straight lines of
+//! the tool.
 
 use super::joints::JointSpace;
 use super::{ConfigurationSpace, find_path};
@@ -20,14 +20,14 @@ const MAX_GOALS: usize = 4;
 const SOLVED_FRACTION: f64 = 0.5;
 /// Difference at which a joint counts as at its value, rad or m: far more than rounding.
 const JOINT_TOLERANCE: f64 = 1e-9;
-/// Longest step between two postures of a straight line, m and rad: the joints move evenly in between, and the tool leaves
-/// the line by less than 5 um on an arm of 1 m.
+/// Longest step between two postures of a straight line, m and rad: the joints move evenly in between, and the tool
+/// leaves the line by less than 5 um on an arm of 1 m.
 const LINE_STEP_M: f64 = 5e-3;
 const LINE_STEP_RAD: f64 = 0.02;
 /// Tolerance of each of these postures, m and rad: all of what a task allows is left for the smoothing of the motion.
 const LINE_TOLERANCE: f64 = 1e-6;
-/// Largest change of a joint in such a step, rad or m: beyond it the line passes a singular posture, where a joint has to
-/// turn on the spot.
+/// Largest change of a joint in such a step, rad or m: beyond it the line passes a singular posture, where a joint has
+/// to turn on the spot.
 const MAX_JOINT_STEP: f64 = 0.2;
 
 /// A goal of an arm's joints.
@@ -81,9 +81,9 @@ pub fn plan_to_goal<const D: usize>(
     Ok(find_path(space, free.take(MAX_GOALS).collect(), draws))
 }
 
-/// Plans the straight line of the tip from where it is to a pose, turning evenly: the joint values after the present ones,
-/// none if joints cannot follow it, or something is in the way. Axes of the target's position that are free keep to the line
-/// as well.
+/// Plans the straight line of the tip from where it is to a pose, turning evenly: the joint values after the present
+/// ones, none if joints cannot follow it, or something is in the way. Axes of the target's position that are free keep
+/// to the line as well.
 ///
 /// # Errors
 /// As [`SerialChain::solve`](crate::kinematics::SerialChain::solve).
@@ -131,8 +131,8 @@ fn solved_goal(goal: &ArmGoal) -> ArmGoal {
     }
 }
 
-/// Returns the turn from a frame to the orientation of a goal as an axis times an angle in rad: of an axis that counts alone
-/// the shortest one.
+/// Returns the turn from a frame to the orientation of a goal as an axis times an angle in rad: of an axis that counts
+/// alone the shortest one.
 fn turn_to(start: &Transform, goal: &ArmGoal) -> [f64; 3] {
     match goal.asked.turn {
         OrientationMask::Free => [0.0; 3],

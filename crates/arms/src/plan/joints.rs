@@ -15,12 +15,13 @@ use std::f64::consts::PI;
 const MAX_SOLUTIONS: usize = 12;
 /// Random postures from which that search starts: five for each posture sought.
 const MAX_RESTARTS: usize = 60;
-/// Largest number of those from which the second tree grows, the nearest first: some may be cut off from the present one.
+/// Largest number of those from which the second tree grows, the nearest first: some may be cut off from the present
+/// one.
 const MAX_GOALS: usize = 4;
-/// Least step between two postures that are checked, as a fraction of the arm's reach. The step is otherwise a quarter of
-/// the least rod or radius, and tiny connectors would make checks of a path endless; thinner obstacles may then be missed
-/// between two checks. With 1e-3 a stride of a tree takes about a thousand checks at most. The value trades these off, and
-/// was not tuned.
+/// Least step between two postures that are checked, as a fraction of the arm's reach. The step is otherwise a quarter
+/// of the least rod or radius, and tiny connectors would make checks of a path endless; thinner obstacles may then be
+/// missed between two checks. With 1e-3 a stride of a tree takes about a thousand checks at most. The value trades
+/// these off, and was not tuned.
 const MIN_STEP: f64 = 1e-3;
 
 /// Where paths of an arm start.
@@ -75,8 +76,8 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         alone.find_veto(points, self.k).or_else(|| self.find_body_veto(body, posture, points))
     }
 
-    /// Returns the objection of a link that would be in something, or deeper in it than it is now: an arm that starts inside
-    /// must be able to get out.
+    /// Returns the objection of a link that would be in something, or deeper in it than it is now: an arm that starts
+    /// inside must be able to get out.
     fn find_body_veto(
         &self,
         body: &ArmBody,

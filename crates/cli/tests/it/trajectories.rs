@@ -1,4 +1,5 @@
-//! The motions of arms, exported for controllers of arms: read back by another program, and within the limits of the joints.
+//! The motions of arms, exported for controllers of arms: read back by another program, and within the limits of the
+//! joints.
 
 use crate::readers::{has, script};
 use crate::support::TestFolder;

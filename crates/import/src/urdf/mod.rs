@@ -69,7 +69,8 @@ pub struct Joint {
     /// axis.
     pub axis: [f64; 3],
     /// Lowest and highest value, in rad or m; `None` for joints without such limits. The soft limits of a
-    /// `<safety_controller>` narrow them. An end that the file gives as a number beyond 1e6 is no limit, and 1e6 if only one end is so.
+    /// `<safety_controller>` narrow them. An end that the file gives as a number beyond 1e6 is no limit, and 1e6 if
+    /// only one end is so.
     pub limits: Option<Limits>,
     /// Highest speed, in rad/s or m/s; `None` where the file gives none, or what many files have for that: 0, a
     /// negative number or one beyond 1e6.
@@ -143,8 +144,8 @@ impl Model {
     /// Reads the URDF file at `path`, plain or compressed with gzip.
     ///
     /// # Errors
-    /// When the file cannot be read, has xacro where joints may need it, is not URDF, or does not describe a tree of links;
-    /// with file, line and column.
+    /// When the file cannot be read, has xacro where joints may need it, is not URDF, or does not describe a tree of
+    /// links; with file, line and column.
     pub fn load(path: &Path) -> Result<Self, InputError> {
         let place = path.display().to_string();
         if place.trim_end_matches(".gz").ends_with(".xacro") {

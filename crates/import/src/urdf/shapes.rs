@@ -102,8 +102,8 @@ const MAX_POINTS: usize = 1 << 23;
 
 impl Model {
     /// Returns the solids of all links. Meshes (STL, OBJ and DAE) are replaced by their convex hulls. They are searched
-    /// for next to `urdf`, the model's own file, and for `package://NAME/REST` in the folders above it; they have to lie in
-    /// the package of the model, or in the one that they name. A mesh that cannot be read is left out and said.
+    /// for next to `urdf`, the model's own file, and for `package://NAME/REST` in the folders above it; they have to
+    /// lie in the package of the model, or in the one that they name. A mesh that cannot be read is left out and said.
     pub fn solids(&self, urdf: &Path) -> Solids {
         let mut reader = SolidReader {
             urdf,

@@ -1,7 +1,7 @@
 //! The motions of arms as ROS 2 and others take them: a folder that is a bag, with a CSV and a JSON file for each arm.
 //!
-//! The bag has `/NAME/joint_trajectory` (`trajectory_msgs/msg/JointTrajectory`), one message with all points at the time
-//! of the first, and `/NAME/joint_states` (`sensor_msgs/msg/JointState`), one for each point.
+//! The bag has `/NAME/joint_trajectory` (`trajectory_msgs/msg/JointTrajectory`), one message with all points at the
+//! time of the first, and `/NAME/joint_states` (`sensor_msgs/msg/JointState`), one for each point.
 
 use super::target::Target;
 use super::{ExportContext, ExportResult};

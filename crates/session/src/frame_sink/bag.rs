@@ -160,7 +160,8 @@ impl FrameSink for BagSink {
     }
 }
 
-/// Names the robot that carries each scanner: in a chain of robots, scans are those of the connector that a robot keeps to.
+/// Names the robot that carries each scanner: in a chain of robots, scans are those of the connector that a robot keeps
+/// to.
 fn mount_on_robots(frame: &mut Frame) {
     for scan in &mut frame.scans {
         let [number, part] = [Some(scan.of.number), scan.of.part];

@@ -61,8 +61,8 @@ fn cycle_reach_box<const D: usize>(
     chain_box.joined(&robots_reach_box(spec, body, world.dt_s))
 }
 
-/// Returns the box of the places that an arm's joints may take on their way to their reference; none of other chains, or
-/// while they rest.
+/// Returns the box of the places that an arm's joints may take on their way to their reference; none of other chains,
+/// or while they rest.
 fn reference_box<const D: usize>(spec: &ChainSpec<D>, body: &ChainBodyState<D>) -> Aabb<D> {
     let (Some(arm), Some(joints)) = (&spec.arm, &body.joints) else { return Aabb::empty() };
     if body.motion.is_at_rest() {

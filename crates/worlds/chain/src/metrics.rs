@@ -355,7 +355,8 @@ metrics! {
         pub min_clearance_m: Option<f64> => "least clearance",
         /// Greatest amount by which a rod was outside its limits. In meters.
         pub max_rod_violation_m: f64 => "greatest error of a rod",
-        /// Share of their tasks that the chains have done, 0 to 1, on average. See [`super::world::ChainWorld::progress`].
+        /// Share of their tasks that the chains have done, 0 to 1, on average. See
+        /// [`super::world::ChainWorld::progress`].
         pub progress: f64 => "share of the tasks done",
         /// Steps per second of processor time; measured. Processor time is that of the run of this process.
         pub steps_per_cpu_s: f64 => "speed of simulation",
@@ -372,7 +373,7 @@ metrics! {
         /// Most steps in a row at whose ends some part of one chain was deeper than 1e-6 m in an obstacle, or in another of
         /// its parts.
         pub longest_inside_steps: u64 => "steps inside in a row, at most",
-        /// Least gap between parts of a chain that share no joint (of more than 32 rods: in every 16th cycle, of
+        /// Least distance between parts of a chain that share no joint (of more than 32 rods: in every 16th cycle, of
         /// more than 1,024 more rarely); below 0 where they overlapped; none if none came near. In meters, while they are solid to each other.
         pub min_own_gap_m: Option<f64> => "least distance of own parts",
         /// Tasks done, targets reached.

@@ -45,8 +45,8 @@ struct NearestBody {
 }
 
 impl ArmBody {
-    /// Returns the body with a capsule for each rod of a skeleton (`chain`'s) none of whose links has a shape, as thick as
-    /// `radius_m`. Rods that change their length have none.
+    /// Returns the body with a capsule for each rod of a skeleton (`chain`'s) none of whose links has a shape, as thick
+    /// as `radius_m`. Rods that change their length have none.
     #[must_use]
     pub fn with_rods(mut self, chain: &SerialChain, skeleton: &Skeleton, radius_m: f64) -> Self {
         for rod in 0..skeleton.rods.len() {
@@ -60,8 +60,8 @@ impl ArmBody {
         self
     }
 
-    /// Returns the body with a tool: the last rod of the skeleton (`chain`'s) as a capsule, and a ball around its end. It may
-    /// touch the link that carries it.
+    /// Returns the body with a tool: the last rod of the skeleton (`chain`'s) as a capsule, and a ball around its end.
+    /// It may touch the link that carries it.
     #[must_use]
     pub fn with_tool(
         mut self,
@@ -109,8 +109,8 @@ impl ArmBody {
         }
     }
 
-    /// Leaves the pairs out that overlap at a posture, because a body that touches itself there may do so; returns their
-    /// names and depths in m.
+    /// Leaves the pairs out that overlap at a posture, because a body that touches itself there may do so; returns
+    /// their names and depths in m.
     pub fn exempt_overlaps(&mut self, posture: BodyPosture<'_>) -> Vec<(String, String, f64)> {
         let shapes = self.shapes_at(posture);
         let mut exempt = Vec::new();
@@ -127,8 +127,8 @@ impl ArmBody {
         exempt
     }
 
-    /// Returns the deepest overlap at a posture: with an obstacle, or of two parts if `own` ones count. Parts that are fixed in
-    /// the base never meet obstacles: they cannot get away.
+    /// Returns the deepest overlap at a posture: with an obstacle, or of two parts if `own` ones count. Parts that are
+    /// fixed in the base never meet obstacles: they cannot get away.
     pub fn deepest_contact<const D: usize>(
         &self,
         posture: BodyPosture<'_>,
@@ -143,8 +143,8 @@ impl ArmBody {
         Some(BodyContact { link, obstacle, depth_m: -apart_m })
     }
 
-    /// Returns the least distance of a part from an obstacle up to `look_m`, and the link of that part; negative where they
-    /// overlap.
+    /// Returns the least distance of a part from an obstacle up to `look_m`, and the link of that part; negative where
+    /// they overlap.
     pub fn clearance_m<const D: usize>(
         &self,
         posture: BodyPosture<'_>,
@@ -155,10 +155,11 @@ impl ArmBody {
         nearest.map_or((look_m, 0), |near| (near.apart_m, near.link))
     }
 
-    /// Returns the least distance of two parts that must not touch, up to `within_m`; negative where they overlap.
+    /// Returns the least distance of two parts that must not touch; negative where they overlap, infinite if it is more
+    /// than `within_m`.
     pub fn own_gap_m(&self, posture: BodyPosture<'_>, within_m: f64) -> f64 {
         let nearest = self.nearest_own_part(&self.shapes_at(posture), within_m);
-        nearest.map_or(within_m, |near| near.apart_m)
+        nearest.map_or(f64::INFINITY, |near| near.apart_m)
     }
 
     /// Returns where all parts are in the world.
@@ -186,7 +187,8 @@ impl ArmBody {
         nearest
     }
 
-    /// Returns the obstacle nearest to any part that moves, up to `within_m`; of equally near ones that of the least id.
+    /// Returns the obstacle nearest to any part that moves, up to `within_m`; of equally near ones that of the least
+    /// id.
     fn nearest_obstacle<const D: usize>(
         &self,
         shapes: &[PlacedShape],

@@ -14,8 +14,8 @@ use sidestep_kernel::geometry::{cross, dot, norm, normalized, perpendicular, sca
 use sidestep_kernel::math::atan2;
 
 /// The length as which an error of 1 rad counts, as a fraction of the arm's reach. Steps reduce the sum of squared
-/// errors, so it trades place off against orientation: the last joints of most arms turn the tip on a lever of about this
-/// length. Both errors end below their tolerances in any case; the value was not tuned by itself.
+/// errors, so it trades place off against orientation: the last joints of most arms turn the tip on a lever of about
+/// this length. Both errors end below their tolerances in any case; the value was not tuned by itself.
 const RADIAN_LENGTH: f64 = 0.3;
 
 /// What a search measures at each posture.

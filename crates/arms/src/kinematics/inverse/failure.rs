@@ -1,9 +1,9 @@
 //! The reason why no posture meets a goal: of the constraints without which one would, the nearest to being kept.
 //!
-//! The goal is solved again without each constraint. What then has to give way is a distance: of a joint beyond its limit,
-//! of a part in another body, or of the tip's orientation, angles as the length on which the search weighs them. The least
-//! one is the reason. A posture far beyond the limits of three joints says little; so the limits are widened as little as
-//! possible, by bisection, and the joint that is then the farthest outside is reported.
+//! The goal is solved again without each constraint. What then has to give way is a distance: of a joint beyond its
+//! limit, of a part in another body, or of the tip's orientation, angles as the length on which the search weighs them.
+//! The least one is the reason. A posture far beyond the limits of three joints says little; so the limits are widened
+//! as little as possible, by bisection, and the joint that is then the farthest outside is reported.
 
 use super::super::serial::JointMotionKind;
 use super::criteria::PostureEvaluator;

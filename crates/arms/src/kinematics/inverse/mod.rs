@@ -62,8 +62,8 @@ impl SerialChain {
         Ok(IkSearch::new(self, &skeleton, goal).run(start))
     }
 
-    /// Returns the distance of the tip at these values from the goal's target in m, and the angle from its orientation in
-    /// rad, of the parts that count.
+    /// Returns the distance of the tip at these values from the goal's target in m, and the angle from its orientation
+    /// in rad, of the parts that count.
     pub fn pose_error(&self, goal: &ArmGoal, values: &[f64]) -> (f64, f64) {
         let tip = self.forward_kinematics(values).tip;
         PostureEvaluator::new(self, &self.skeleton(), goal).tip_errors(&tip)

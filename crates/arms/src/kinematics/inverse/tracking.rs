@@ -1,8 +1,8 @@
 //! Joint values for the places of connectors: the demands of a chain's motion on an arm's joints within one cycle.
 //!
-//! A chain of rods has more degrees of freedom than most arms: its motion is a guide. First all connectors are brought as near
-//! to their places in it as the joints can, then the connectors that lead are brought to theirs exactly. Both stay in
-//! a *room* of each variable: its limits, and the range that its rates allow in a cycle.
+//! A chain of rods has more degrees of freedom than most arms: its motion is a guide. First all connectors are brought
+//! as near to their places in it as the joints can, then the connectors that lead are brought to theirs exactly. Both
+//! stay in a *room* of each variable: its limits, and the range that its rates allow in a cycle.
 
 use super::super::serial::{JointMotionKind, MovingJoint, SerialChain};
 use super::super::skeleton::{LinkAnchor, Skeleton};
@@ -11,16 +11,16 @@ use super::fast_fk::{FastFk, LinkTransforms};
 use super::step::{IkStepInput, IkStepper, JointRanges};
 use sidestep_kernel::geometry::{norm, sub};
 
-/// Weight of a connector's place in the guide, beside 1 of those that lead: they come first, and are then met exactly in a
-/// descent of their own.
+/// Weight of a connector's place in the guide, beside 1 of those that lead: they come first, and are then met exactly
+/// in a descent of their own.
 const GUIDE_WEIGHT: f64 = 0.3;
 /// Largest number of steps toward the guide: it need not be reached, so a few suffice.
 const MAX_GUIDE_STEPS: usize = 4;
 /// Largest number of steps toward the targets of connectors that lead, which are to be met exactly.
 const MAX_LEAD_STEPS: usize = 24;
-/// First damping of both, as a fraction of the mean of the matrix's diagonal. Within a cycle joints are near their aims,
-/// so it is far below that of descents from any posture; the guide's is larger, because it asks for more than the joints
-/// can do.
+/// First damping of both, as a fraction of the mean of the matrix's diagonal. Within a cycle joints are near their
+/// aims, so it is far below that of descents from any posture; the guide's is larger, because it asks for more than the
+/// joints can do.
 const GUIDE_DAMPING: f64 = 1e-2;
 const LEAD_DAMPING: f64 = 1e-4;
 /// Factors of the damping after a step that helped, and after one that did not.
@@ -28,8 +28,8 @@ const DAMPING_DECREASE: f64 = 0.1;
 const DAMPING_INCREASE: f64 = 10.0;
 /// Steps in a row that do not help, after which the descent ends.
 const MAX_IDLE_STEPS: usize = 4;
-/// Distance from its place, as a fraction of the reach, at which a connector counts as being there: a few hundred times the
-/// rounding of forward kinematics.
+/// Distance from its place, as a fraction of the reach, at which a connector counts as being there: a few hundred times
+/// the rounding of forward kinematics.
 const ARRIVAL_TOLERANCE: f64 = 1e-13;
 
 /// An arm whose joints follow the places of its connectors.

@@ -20,7 +20,8 @@ use crate::swarm::leader::LeaderDecision;
 use crate::world::purpose;
 use sidestep_rods::geometry::{Point, add_scaled, convert_dimensions, distance, move_toward};
 
-/// Fraction of its step by which an arm's tool comes nearer to a target in a cycle, at least, as long as it needs no plan.
+/// Fraction of its step by which an arm's tool comes nearer to a target in a cycle, at least, as long as it needs no
+/// plan.
 const MIN_APPROACH_FRACTION: f64 = 0.1;
 
 /// The move that a driver wants in a cycle.

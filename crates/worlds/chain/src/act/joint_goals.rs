@@ -1,5 +1,5 @@
-//! Targets of an arm that are more than the place of a connector: poses of its tool, straight lines, and joint values. Local
-//! rules know places alone, so these are always planned.
+//! Targets of an arm that are more than the place of a connector: poses of its tool, straight lines, and joint values.
+//! Local rules know places alone, so these are always planned.
 
 use super::joint_motion::has_come_to_rest;
 use super::plan::is_plan_due;

@@ -40,13 +40,13 @@ pub(super) fn finish_cycle<const D: usize>(
 ) {
     let (Some(arm), Some(actual)) = (context.spec.arm.as_deref(), actual) else { return };
     let Some(reference) = body.joints.take() else { return };
-    let (next, rates) = arm.motion.advance(&mut body.motion, &actual, &reference);
-    body.tally.add_joint_rates(&rates);
-    if next != reference {
-        let points: Vec<Point<D>> = arm.connector_positions(&next);
+    let step = arm.motion.advance(&mut body.motion, &actual, &reference);
+    body.tally.add_joint_rates(&step.rates);
+    if step.joints != reference {
+        let points: Vec<Point<D>> = arm.connector_positions(&step.joints);
         body.chain.points_mut().copy_from_slice(&points);
     }
-    body.joints = Some(next);
+    body.joints = Some(step.joints);
 }
 
 /// Returns whether a chain's connector is where it is led to be: of an arm the joints follow its reference, and have to
@@ -71,7 +71,7 @@ pub(super) struct ArmClearance {
     pub(super) obstacles_m: f64,
     /// The connector that stands for the part which is nearest to one.
     pub(super) connector: usize,
-    /// Between parts that must not touch, up to the least one so far, m.
+    /// Between parts that must not touch, m; infinite if it does not matter how far apart they are.
     pub(super) own_m: f64,
 }
 

@@ -182,8 +182,8 @@ fn run_cycle<const D: usize>(
     measure::measure_chain(context, &mut acting, &mut scratch.own_rods, robots_gap_m);
 }
 
-/// Lets a whole chain escape from obstacles, carry out its task, and stay in its claim. Escapes come first, because they
-/// may use up the speed that the task would need.
+/// Lets a whole chain escape from obstacles, carry out its task, and stay in its claim. Escapes come first, because
+/// they may use up the speed that the task would need.
 fn act_whole_chain<const D: usize>(
     context: ChainContext<'_, D>,
     acting: &mut ChainCycleState<'_, D>,

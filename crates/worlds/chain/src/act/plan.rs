@@ -21,8 +21,8 @@ use std::collections::VecDeque;
 const MIN_FRACTION: f64 = 1e-6;
 /// Bisections of a straight piece of an arm's path: to a millionth of it, less than rounding of what a cycle allows.
 const BISECTIONS: usize = 20;
-/// Fraction of its tolerance within which a tool keeps to a line: the rest is for the line itself, which is measured by the
-/// references on it.
+/// Fraction of its tolerance within which a tool keeps to a line: the rest is for the line itself, which is measured by
+/// the references on it.
 const LINE_FRACTION: f64 = 0.9;
 /// Shares of a cycle's step that are tried, each half of the one before.
 const MAX_STEP_TRIES: usize = 5;
@@ -63,8 +63,8 @@ pub(super) fn plan_if_stuck<const D: usize>(
     body.plan = plan_found;
 }
 
-/// Returns whether a path is planned after so many cycles without coming nearer: after one, two, four, eight times the time
-/// of the task.
+/// Returns whether a path is planned after so many cycles without coming nearer: after one, two, four, eight times the
+/// time of the task.
 pub(super) fn is_plan_due<const D: usize>(initiator: Initiator<'_, D>, late: u32) -> bool {
     let Some(after_s) = initiator.task.plans_after_s else { return false };
     let after = ((after_s / initiator.context.world.dt_s).ceil() as u32).max(1);

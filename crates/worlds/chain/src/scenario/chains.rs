@@ -24,8 +24,8 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Free distance around the parts of a chain that starts anywhere, as a multiple of its radius: at exactly one radius
-/// its first motion would be vetoed. A larger factor refuses starts in narrow passages; how much larger than 1 it has to
-/// be was chosen, not measured.
+/// its first motion would be vetoed. A larger factor refuses starts in narrow passages; how much larger than 1 it has
+/// to be was chosen, not measured.
 const ROOM_FACTOR: f64 = 1.2;
 /// Margin of connectors around robots that follow them on wheels, which lag behind, meters. Without one, robots
 /// hung on the walls that their connectors graze, with bumpers pressed 47 to 62 % of the time; 0.05 was enough where
@@ -34,7 +34,8 @@ const MARGIN_M: f64 = 0.08;
 /// Radius of connectors, unless it is given, meters.
 const DEFAULT_RADIUS_M: f64 = 0.05;
 /// Radius of rods, unless it is given, as a multiple of that of their connectors: a master that touches a wall with a
-/// thick rod blocks half a plane, and slaves jump 12 to 19 times as far as a step. The rods of a swarm are virtual anyway.
+/// thick rod blocks half a plane, and slaves jump 12 to 19 times as far as a step. The rods of a swarm are virtual
+/// anyway.
 const ROD_RADIUS_FACTOR: f64 = 0.2;
 /// The same for the links of an arm: they are solid, and about as thick as its joints.
 const LINK_RADIUS_FACTOR: f64 = 0.8;
@@ -681,8 +682,8 @@ fn is_endless<const D: usize>(task: &Task<D>) -> bool {
     !has_an_end && task.lasts_s.is_infinite()
 }
 
-/// Returns the positions of connectors in legs there and back, each beside the one before: to the left in the plane. The
-/// legs and the spans between them have as many rods as come nearest to their lengths, one at least.
+/// Returns the positions of connectors in legs there and back, each beside the one before: to the left in the plane.
+/// The legs and the spans between them have as many rods as come nearest to their lengths, one at least.
 fn folded<const D: usize>(
     n: usize,
     start: Point<D>,

@@ -57,7 +57,8 @@ pub struct ChainBodyState<const D: usize> {
     pub(crate) missing: Vec<MissingNeighbors>,
     /// Decisions that agents in other processes have submitted for a cycle.
     pub(crate) submitted: Option<ChainCycleControls<D>>,
-    /// Motions that the chain has yet to follow; none in a body that [`ChainState::body`](super::ChainState::body) returns.
+    /// Motions that the chain has yet to follow; none in a body that [`ChainState::body`](super::ChainState::body)
+    /// returns.
     pub(crate) deferred: DeferredMotions<D>,
 }
 
@@ -79,7 +80,8 @@ pub struct ScatteredPartState {
     pub(crate) waited: Cycle,
 }
 
-/// A planned path to a target: the postures still to be reached, each in a straight line from the one before; at least one.
+/// A planned path to a target: the postures still to be reached, each in a straight line from the one before; at least
+/// one.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum MotionPlan<const D: usize> {
     /// Places of all connectors.

@@ -1,7 +1,7 @@
 //! Snapshots: the content of checkpoints, covered by the digest.
 //!
-//! Each chain has a [`ChainRecord`]. What only some chains have is a [`SnapshotComponent`]: it saves itself to a list of its
-//! own, by id, of the chains where there is something to save.
+//! Each chain has a [`ChainRecord`]. What only some chains have is a [`SnapshotComponent`]: it saves itself to a list
+//! of its own, by id, of the chains where there is something to save.
 
 use super::body::{
     ChainBodyState, MissingNeighbors, MotionPlan, ScatteredPartState, Standstill, flatten,
