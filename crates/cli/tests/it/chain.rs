@@ -113,7 +113,7 @@ fn workers_and_recording_change_nothing_and_set_reaches_nested_keys() {
     assert_ne!(digest(&["--seed", "6"]), plain);
     for nested in [
         "chain.dt_s=0.04",
-        "chains.0.radius_m=0.06",
+        "chains.0.radius_m=0.1",
         "chains.1.tasks.speed_m_s=0.2",
         "chains.0.tasks.targets_m=[[0.3,0.0]]",
     ] {

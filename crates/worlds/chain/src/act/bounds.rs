@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-9;
 /// How a chain escapes, and where it may be.
 pub(super) struct EscapeContext<'a, const D: usize> {
     pub(super) escaper: Option<&'a mut ObstacleEscaper<D>>,
-    /// Its positions after parts of it escaped.
+    /// Its positions after parts of it escaped; none where nothing escapes and no other chain is there.
     pub(super) escaped: &'a mut PositionBuffer<D>,
     /// The box that it stays in.
     pub(super) claim: Aabb<D>,
@@ -60,7 +60,7 @@ impl<const D: usize> EscapeContext<'_, D> {
 
     /// Returns whether a connector escaped in this cycle.
     pub(super) fn has_escaped(&self, k: usize, before: &PositionBuffer<D>) -> bool {
-        self.escaped.points.get(k) != before.points.get(k)
+        self.escaped.points.get(k).is_some_and(|at| before.points.get(k) != Some(at))
     }
 
     /// Undoes moves that would leave the claim, because chains of other conflict groups move at the same time and

@@ -20,9 +20,12 @@ use crate::swarm::leader::LeaderDecision;
 use crate::world::purpose;
 use sidestep_rods::geometry::{Point, add_scaled, convert_dimensions, distance, move_toward};
 
-/// Fraction of its step by which an arm's tool comes nearer to a target in a cycle, at least, as long as it needs no
-/// plan.
-const MIN_APPROACH_FRACTION: f64 = 0.1;
+/// Fraction of a cycle's step by which an initiator has to come nearer to its target for that to count: a chain that slides
+/// along itself by a hair in each cycle does not get there.
+const MIN_GAIN_FRACTION: f64 = 0.02;
+/// The same of an arm's tool, whose joints must be able to stop: one that grazes an obstacle creeps on, and a plan leads it
+/// there sooner.
+const MIN_ARM_GAIN_FRACTION: f64 = 0.1;
 
 /// The move that a driver wants in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -144,10 +147,10 @@ fn step_to_target<const D: usize>(
         return step_to_joint_goal(initiator, acting, targets, goal);
     }
     let left_m = distance(at, target);
-    // An arm that grazes an obstacle creeps on, because its joints must be able to stop: a plan leads it there sooner.
     let is_arm = initiator.context.spec.arm.is_some();
-    let least_m = if is_arm { MIN_APPROACH_FRACTION * initiator.step_m() } else { 0.0 };
-    let comes_nearer = driving.nearest_m - left_m > least_m.min(left_m);
+    let min_gain_fraction = if is_arm { MIN_ARM_GAIN_FRACTION } else { MIN_GAIN_FRACTION };
+    let min_gain_m = (min_gain_fraction * initiator.step_m()).min(left_m);
+    let comes_nearer = driving.nearest_m - left_m > min_gain_m;
     // On a planned path a chain goes away from its target at first, and that is no time lost.
     if !is_planned {
         driving.late = if comes_nearer { 0 } else { driving.late.saturating_add(1) };

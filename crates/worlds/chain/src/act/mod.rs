@@ -153,7 +153,12 @@ fn run_cycle<const D: usize>(
     let joints = joint_motion::start_cycle(context, body);
     if follows != ChainFollowMode::Deferred {
         scratch.before.record(body);
-        scratch.escaped.record(body);
+        // Only what escapes, or has neighbors, is ever put back there.
+        if world.escape.is_some() || world.chains.len() > 1 {
+            scratch.escaped.record(body);
+        } else {
+            scratch.escaped.points.clear();
+        }
     }
     let mut escaping =
         EscapeContext { escaper: scratch.escaper.as_mut(), escaped: &mut scratch.escaped, claim };

@@ -6,7 +6,7 @@ use super::{ChainContext, ChainCycleState, Initiator};
 use crate::driver::external::{OrderOutcome, Orders, Target};
 use crate::driver::step_motion::StepMotion;
 use crate::motion::recovery::RecoveryOutcome;
-use crate::motion::request::execute_request;
+use crate::motion::request::{execute_request, find_speed_veto, max_cycle_step_m};
 use crate::state::ChainBodyState;
 use sidestep_rods::geometry::{convert_dimensions, norm, normalized, sub};
 use sidestep_rods::{
@@ -142,9 +142,17 @@ fn request_partial_motion<const D: usize>(
     // The caller gets a report of a veto, as a planner does.
     let request = MotionRequest { motion, source: RequestSource::Planner, mode: VetoEffect::Exact };
     let ChainCycleState { body, before, propagator, .. } = acting;
+    let at = body.chain.points().to_vec();
+    let most_m = max_cycle_step_m(&body.chain, &propagator.rules);
     let outcome = execute_request(propagator, &mut body.chain, context.obstacles, &request);
-    let outcome = outcome
+    let mut outcome = outcome
         .unwrap_or_else(|_| MotionOutcome::Vetoed(out_of_range_veto(&body.chain, step.first)));
+    // A cycle may take several requests, and the speed is that of all of them together.
+    let too_fast = find_speed_veto(&before.points, body.chain.points(), step.first, most_m);
+    if let Some(veto) = too_fast {
+        body.chain.points_mut().copy_from_slice(&at);
+        outcome = MotionOutcome::Vetoed(veto);
+    }
     let outcome = match ArmJointSolver::from_body(context, before, body) {
         Some(mut arm) => arm.execute_order(step, part, outcome),
         None => outcome,

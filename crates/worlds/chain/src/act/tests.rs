@@ -17,6 +17,8 @@ use sidestep_scenario::Source as Text;
 use sidestep_testing::root;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+mod own_body;
+
 /// Returns a run of a scenario in the plane.
 fn run(text: &str) -> ChainRun<2> {
     let source = Text::new("s.toml", format!("format = 1\nworld = \"chain\"\n{text}"), root());

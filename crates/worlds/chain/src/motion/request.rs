@@ -5,8 +5,8 @@ use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, distance, lerp};
 use sidestep_rods::{
     Chain, CompletedMotion, Connector, Mobility, MotionOutcome, MotionRequest, Obstacles,
-    Propagator, ReachOutcome, ReachRequest, RequestedMotion, Veto, VetoReason, is_in_range,
-    reach_target,
+    Propagator, ReachOutcome, ReachRequest, ReactionRules, RequestedMotion, Veto, VetoReason,
+    is_in_range, reach_target,
 };
 
 /// What moves a chain, and what it may meet.
@@ -34,12 +34,18 @@ pub(crate) fn execute_request<const D: usize>(
     };
     let order = ReachRequest { k, target: to, base: hold.connector, tolerance_m: TOLERANCE_M };
     let scene = &mut MotionEnvironment { propagator, obstacles };
-    let joints_m =
-        if hold.has_joints { scene.propagator.rules.joint_step_max_m } else { f64::INFINITY };
+    let joints_m = max_cycle_step_m(chain, &scene.propagator.rules);
     try_slowed(chain, k, to, joints_m, |chain, before, target| {
         let order = ReachRequest { target, ..order };
         move_held_chain(scene, chain, before, &order, request)
     })
+}
+
+/// Returns the longest displacement of any connector of a chain in a cycle, meters: held chains have joints, whose speed is
+/// limited.
+pub(crate) fn max_cycle_step_m<const D: usize>(chain: &Chain<D>, rules: &ReactionRules) -> f64 {
+    let has_joints = Hold::of_chain(chain).is_some_and(|hold| hold.has_joints);
+    if has_joints { rules.joint_step_max_m } else { f64::INFINITY }
 }
 
 /// How a chain is held.
@@ -154,6 +160,17 @@ fn try_slowed<const D: usize>(
     Ok(MotionOutcome::Vetoed(speed_veto(k, fastest, from)))
 }
 
+/// Returns the veto of the connector that has moved farther than `most_m` from the positions before a cycle, if one has.
+pub(crate) fn find_speed_veto<const D: usize>(
+    before: &[Point<D>],
+    points: &[Point<D>],
+    k: usize,
+    most_m: f64,
+) -> Option<Veto<D>> {
+    let (by, longest_m) = max_displacement(before, points);
+    (longest_m > most_m * (1.0 + ROUNDING)).then(|| speed_veto(k, by, before[k]))
+}
+
 /// Returns the veto of connector `by`, which would be too fast, against a motion of connector `k`.
 fn speed_veto<const D: usize>(k: usize, by: usize, reached: Point<D>) -> Veto<D> {
     Veto { by, from: k, reason: VetoReason::StepLimit, obstacle: None, reached }
@@ -200,6 +217,8 @@ fn move_to_target<const D: usize>(
 /// Most attempts to find the distance that an initiator may go: as an elbow moves with the square root of the tool's
 /// motion at worst, each halves the excess in orders of magnitude, so that few are needed.
 const MAX_SLOWED_TRIES: usize = 16;
+/// Relative tolerance for motions at exactly the maximum speed.
+const ROUNDING: f64 = 1e-9;
 /// Fraction of the limit that an attempt aims at, because near singular postures joints slow down less
 /// than the initiator.
 const SLOWED_FRACTION: f64 = 0.9;
@@ -291,7 +310,7 @@ fn motion_since<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sidestep_rods::{ReactionRules, RequestSource, Rod, VetoEffect};
+    use sidestep_rods::{RequestSource, Rod, VetoEffect};
 
     /// An arm of two rods, bent a little; the base is fixed.
     fn arm() -> Chain<2> {
