@@ -361,7 +361,8 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns whether parts near each other along the chain keep their distances at every bend of up to a right angle:
-    /// with one rod between them they are as far apart as it is long, and the ends of two rods the diagonal of a square.
+    /// with one rod between them they are as far apart as it is long, and the ends of two rods the diagonal of a
+    /// square.
     pub(super) fn clears_right_angles(&self) -> bool {
         let diagonal_m = SQRT_2 * self.measures.min_rod_m;
         self.neighbor_separation_m() <= self.measures.min_rod_m

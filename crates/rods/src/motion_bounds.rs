@@ -1,13 +1,14 @@
 //! Proof that a motion brings no two parts of a chain near each other, without a test of each pair.
 //!
 //! Parts near each other along the chain are never far apart, so no distance proves anything about them; but as long as
-//! all rods of a stretch point forward along one direction, its parts follow each other in that direction and cannot meet,
-//! however far they move ([`is_monotone`]). That takes a few products per rod.
+//! all rods of a stretch point forward along one direction, its parts follow each other in that direction and cannot
+//! meet, however far they move ([`is_monotone`]). That takes a few products per rod.
 //!
-//! For parts farther along, the idea is that of conservative advancement and of Verlet lists. The gap between a part and
-//! all others has been measured at some time. Since then none has come nearer by more than twice the longest travel of
-//! any connector, which an odometer sums up. Only parts whose gap is used up are measured again; most need not be for
-//! many motions. Blocks of rods are measured by their boxes, and single rods only where those do not suffice.
+//! For parts farther along, the idea is that of conservative advancement and of Verlet lists. The gap between a part
+//! and all others has been measured at some time. Since then none has come nearer by more than twice the longest
+//! travel of any connector, which an odometer sums up. Only parts whose gap is used up are measured again; most need
+//! not be for many motions. Blocks of rods are measured by their boxes, and single rods only where those do not
+//! suffice.
 //!
 //! Whether a proof succeeds follows from the motion alone, never from what was measured before: a gap that is not used
 //! up would suffice if it were measured again.
@@ -22,8 +23,8 @@ use std::ops::Range;
 
 /// Distance that is kept beyond the one needed, meters: far more than rounding.
 const MARGIN_M: f64 = 1e-8;
-/// Part of it that a gap measured earlier must have left, meters: far more than rounding, so that it would also suffice if
-/// it were measured now.
+/// Part of it that a gap measured earlier must have left, meters: far more than rounding, so that it would also
+/// suffice if it were measured now.
 const SLACK_M: f64 = 1e-9;
 /// Distance up to which other parts are searched, in lengths of the longest rod or block: a longer search finds more
 /// parts, a shorter one is soon repeated. The value trades these off, and was not tuned.
@@ -48,8 +49,8 @@ pub(super) struct ProvenMotion {
     pub(super) moved: Range<usize>,
     /// Longest travel of any of them, meters.
     pub(super) travel_m: f64,
-    /// Whether the proof is to hold for parts that move one after the other as well, as reactions are checked: only then
-    /// would these checks have made the same motion.
+    /// Whether the proof is to hold for parts that move one after the other as well, as reactions are checked: only
+    /// then would these checks have made the same motion.
     pub(super) in_turn: bool,
 }
 
@@ -146,8 +147,8 @@ impl<const D: usize> SeparationBounds<D> {
     /// other, neither at its end nor on its path.
     pub(super) fn allows(&mut self, chain: &Chain<D>, motion: &ProvenMotion) -> bool {
         self.add_travel(motion.travel_m);
-        // On the path both parts were up to the travel from where they are at its end, and the test of paths adds it once
-        // more.
+        // On the path both parts were up to the travel from where they are at its end, and the test of paths adds it
+        // once more.
         let needed_m = 3.0 * motion.travel_m + MARGIN_M;
         let rods = chain.rods().len();
         for stretch in stretches(rods) {
@@ -169,8 +170,8 @@ impl<const D: usize> SeparationBounds<D> {
     }
 
     /// Returns whether all rods of a stretch point forward along one direction, before the motion and after it, each by
-    /// more than the thickness of its parts. Then no two parts of the stretch meet: of any two, the later one is farther
-    /// along by at least one such distance. As the ends of the rods move straight, that holds on the whole way.
+    /// more than the thickness of its parts. Then no two parts of the stretch meet: of any two, the later one is
+    /// farther along by at least one such distance. As the ends of the rods move straight, that holds on the whole way.
     fn is_monotone(&self, chain: &Chain<D>, stretch: Range<usize>) -> bool {
         let connectors = stretch.start..stretch.end + 1;
         let before = &self.points[connectors.clone()];
@@ -185,8 +186,8 @@ impl<const D: usize> SeparationBounds<D> {
         least >= (chain.neighbor_separation_m() + MARGIN_M) * norm(along)
     }
 
-    /// Returns whether the parts of a stretch that are near each other along the chain keep their distances, at the end of
-    /// the motion and on its path.
+    /// Returns whether the parts of a stretch that are near each other along the chain keep their distances, at the
+    /// end of the motion and on its path.
     fn are_neighbors_apart(&self, chain: &Chain<D>, stretch: Range<usize>) -> bool {
         let part_sweep = |part: ChainPart| RodSweep {
             from: part.ends(&self.points),
@@ -221,8 +222,8 @@ impl<const D: usize> SeparationBounds<D> {
         true
     }
 
-    /// Returns whether the bend at a connector is a right angle at most, all the way: the product of the rods' directions,
-    /// a parabola of the time, lies within its Bezier coefficients.
+    /// Returns whether the bend at a connector is a right angle at most, all the way: the product of the rods'
+    /// directions, a parabola of the time, lies within its Bezier coefficients.
     fn stays_open(&self, chain: &Chain<D>, k: usize) -> bool {
         let rods =
             |points: &[Point<D>]| [sub(points[k], points[k - 1]), sub(points[k + 1], points[k])];
@@ -232,8 +233,8 @@ impl<const D: usize> SeparationBounds<D> {
         least.min(dot(into_was, out) + dot(into, out_was)) >= 0.0
     }
 
-    /// Returns whether some rods and their connectors are at least `needed_m` from all parts that are not near them along
-    /// the chain.
+    /// Returns whether some rods and their connectors are at least `needed_m` from all parts that are not near them
+    /// along the chain.
     fn are_rods_apart(&mut self, chain: &Chain<D>, rods: Range<usize>, needed_m: f64) -> bool {
         for rod in rods {
             if self.rods.until_m[rod] - self.odometer_m >= needed_m + SLACK_M {

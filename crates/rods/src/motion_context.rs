@@ -18,8 +18,8 @@ use std::ops::Range;
 /// Clearance that a turn aims at, meters. It is a hundred times the tolerance: a master that touches a wall blocks a
 /// half-plane of directions, and with equal values it counts as inside the wall in the next step, which is a veto.
 pub const SKIN_M: f64 = 1e-7;
-/// Penetration that counts as contact, meters: distances of segments are exact to about 1e-15 m of their coordinates, so
-/// rounding is no contact.
+/// Penetration that counts as contact, meters: distances of segments are exact to about 1e-15 m of their coordinates,
+/// so rounding is no contact.
 pub const TOLERANCE_M: f64 = 1e-9;
 /// Tolerance of bend limits, rad: far above the rounding of angles.
 pub const BEND_TOLERANCE_RAD: f64 = 1e-9;
@@ -271,8 +271,9 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         Some(BlockingPart { core, name, rod_separation_m, tip_separation_m, before })
     }
 
-    /// Returns whether a part near along the chain has its place for this motion. One that has yet to follow would object
-    /// where it is now, though it is about to be pushed on; when its turn comes it is checked against what has moved.
+    /// Returns whether a part near along the chain has its place for this motion. One that has yet to follow would
+    /// object where it is now, though it is about to be pushed on; when its turn comes it is checked against what has
+    /// moved.
     fn is_settled(&self, part: ChainPart, moving: &MovingPart) -> bool {
         let Some((rod, _)) = moving.rod else { return false };
         let goes_up = moving.tip > rod;

@@ -71,8 +71,8 @@ impl ChainPart {
         (from < to && !are_rod_ends).then_some([from, to])
     }
 
-    /// Returns whether two parts are so near along the chain that a motion of one nearly always moves the other: one rod
-    /// is between them, or two between two connectors.
+    /// Returns whether two parts are so near along the chain that a motion of one nearly always moves the other: one
+    /// rod is between them, or two between two connectors.
     #[inline]
     pub(super) fn is_near_along_chain(self, other: Self) -> bool {
         let are_connectors = matches!([self, other], [Self::Connector(_), Self::Connector(_)]);
@@ -134,8 +134,8 @@ impl<const D: usize> Chain<D> {
     }
 }
 
-/// Returns the pairs of parts that two rods stand for, `first` before `second`: each rod stands for the connector at its
-/// start as well, and the last rod of the chain for the one at its end, so that no pair is missed or comes twice.
+/// Returns the pairs of parts that two rods stand for, `first` before `second`: each rod stands for the connector at
+/// its start as well, and the last rod of the chain for the one at its end, so that no pair is missed or comes twice.
 pub fn part_pairs(
     first: usize,
     second: usize,
@@ -148,8 +148,8 @@ pub fn part_pairs(
     parts_of(first).flat_map(move |one| parts_of(second).map(move |other| [one, other]))
 }
 
-/// Returns the nearest two of a chain's parts that may not touch, if their gap is less than `within_m`; of equal ones the
-/// first in order. `tree` is a buffer.
+/// Returns the nearest two of a chain's parts that may not touch, if their gap is less than `within_m`; of equal ones
+/// the first in order. `tree` is a buffer.
 pub fn nearest_own_parts<const D: usize>(
     chain: &Chain<D>,
     tree: &mut RodBvh<D>,
@@ -201,8 +201,8 @@ impl<const D: usize> ChainSweep<'_, D> {
         RodSweep { from: part.ends(self.from), to }
     }
 
-    /// Returns two parts that would pass through each other, or come nearer to it than [`RodPairSweep::is_clear`] allows;
-    /// the first in order. `tree` holds the rods where they are after the motion.
+    /// Returns two parts that would pass through each other, or come nearer to it than [`RodPairSweep::is_clear`]
+    /// allows; the first in order. `tree` holds the rods where they are after the motion.
     pub(super) fn find_passage(&self, tree: &RodBvh<D>) -> Option<[ChainPart; 2]> {
         let moves = self.to.iter().zip(&self.from[self.moved.clone()]);
         let longest_m = moves.map(|(to, from)| distance(*to, *from)).fold(0.0, f64::max);

@@ -17,9 +17,9 @@ const ROUNDING_M: f64 = 1e-12;
 type PartVeto = (usize, VetoReason, Option<u32>);
 
 impl<const D: usize> Propagator<D> {
-    /// Returns the objection to a motion of connector `k` that brought a chain from `before` to its present place, every
-    /// connector on a straight path; none if it keeps all that a motion by the rules keeps. What was violated before may
-    /// stay so, and must not get worse.
+    /// Returns the objection to a motion of connector `k` that brought a chain from `before` to its present place,
+    /// every connector on a straight path; none if it keeps all that a motion by the rules keeps. What was violated
+    /// before may stay so, and must not get worse.
     pub fn find_motion_veto(
         &mut self,
         chain: &Chain<D>,

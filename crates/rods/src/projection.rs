@@ -1,10 +1,10 @@
 //! The least motion of a chain whose connector goes to a target: all parts move at once, rods keep their limits, and
 //! connectors that are held stay where they may be.
 //!
-//! The rods of a chain depend only on their neighbors, so the equations for the corrections of all lengths are a band of
-//! three, and a step of Newton's method takes time linear in the rods. Unlike passes from one end of the chain to the
-//! other it does not care how many connectors are held, and moves no joint farther than it must. Parts that come too
-//! near each other are pushed apart between the steps, as in position-based dynamics.
+//! The rods of a chain depend only on their neighbors, so the equations for the corrections of all lengths are a band
+//! of three, and a step of Newton's method takes time linear in the rods. Unlike passes from one end of the chain to
+//! the other it does not care how many connectors are held, and moves no joint farther than it must. Parts that come
+//! too near each other are pushed apart between the steps, as in position-based dynamics.
 
 use super::chain::{Chain, Connector, Mobility};
 use super::geometry::{
@@ -28,8 +28,8 @@ const MAX_PUSHES: usize = 12;
 const PUSH_MARGIN: f64 = 0.01;
 /// Response of a part to a push below which it counts as held, because the division by it would throw it about.
 const MIN_RESPONSE: f64 = 1e-6;
-/// Distance by which connectors are moved off a straight line, as a fraction of the longest rod: enough for the equations
-/// to be far from singular, and less than the thickness of most rods.
+/// Distance by which connectors are moved off a straight line, as a fraction of the longest rod: enough for the
+/// equations to be far from singular, and less than the thickness of most rods.
 const BUCKLE: f64 = 1e-3;
 /// Longest correction of a connector in one step, as a fraction of the longest rod: a longer one leads to another
 /// posture, which is no motion.
@@ -109,8 +109,8 @@ impl<const D: usize> ConstraintProjector<D> {
         if settled != Err(ProjectionFailure::Lengths) {
             return settled;
         }
-        // Along a straight chain all corrections point the same way, and it cannot be shortened by them; a little off the
-        // line it buckles.
+        // Along a straight chain all corrections point the same way, and it cannot be shortened by them; a little off
+        // the line it buckles.
         let off_m = BUCKLE * chain.max_rod_m();
         for side in [1.0, -1.0] {
             points.copy_from_slice(chain.points());

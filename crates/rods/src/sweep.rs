@@ -4,8 +4,8 @@
 //! Both ends go straight from their old to their new place. In the plane the test is exact: the rod
 //! passes a core only where its moving end crosses it, or where an end of the core crosses the rod.
 //! In space a rod may go around anything, so only its distance counts: it is never nearer to the core
-//! than half of the distance that it must keep at rest. [`find_tunneling`](super::find_tunneling) describes the guarantees of
-//! that and their limits.
+//! than half of the distance that it must keep at rest. [`find_tunneling`](super::find_tunneling) describes the
+//! guarantees of that and their limits.
 
 use super::geometry::{
     ConvexCore, Point, add, add_scaled, between_segments, cross_2d, dot, lerp, norm, scaled,
@@ -24,8 +24,8 @@ pub struct RodSweep<const D: usize> {
 /// Fraction of the distance at rest that a rod keeps on its path in space. Any value above 0 rules out
 /// tunneling; the whole distance would forbid turns past an obstacle that the rod may touch.
 const KEPT_FRACTION: f64 = 0.5;
-/// Steps of conservative advancement before a path counts as blocked. They get short only where the rod passes at hardly
-/// more than the distance that it keeps; a veto there is safe.
+/// Steps of conservative advancement before a path counts as blocked. They get short only where the rod passes at
+/// hardly more than the distance that it keeps; a veto there is safe.
 const MAX_ADVANCES: usize = 64;
 
 impl<const D: usize> RodSweep<D> {

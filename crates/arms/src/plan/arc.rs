@@ -1,8 +1,8 @@
 //! Simple postures of a chain: straight ones, and arcs that end at a target.
 //!
 //! A chain that is caught in its own body gets out of it by uncurling, and to a target by curling up again: from any
-//! straight posture every arc can be reached without the chain meeting itself. So they are worth a try before any random
-//! postures.
+//! straight posture every arc can be reached without the chain meeting itself. So they are worth a try before any
+//! random postures.
 
 use super::space::ChainConfigurationSpace;
 use super::{ChainPosture, ConfigurationSpace, PlanningQuery};
@@ -14,8 +14,8 @@ use sidestep_rods::geometry::{
 };
 use std::f64::consts::TAU;
 
-/// Distances of the root from the target, in lengths of the chain between them, of which arcs are tried: from gentle ones,
-/// which meet nothing of themselves, to half circles and more.
+/// Distances of the root from the target, in lengths of the chain between them, of which arcs are tried: from gentle
+/// ones, which meet nothing of themselves, to half circles and more.
 const ARC_REACHES: [f64; 4] = [0.9, 0.7, 0.4, 0.15];
 /// Steps in which a chain uncurls: in each its rods turn by a tenth of all its bends, little enough to go straight from
 /// one posture to the next.
@@ -24,8 +24,8 @@ const UNCURL_STEPS: usize = 10;
 const BISECTIONS: usize = 60;
 
 impl<const D: usize> ChainConfigurationSpace<'_, D> {
-    /// Returns postures at the target: arcs to both sides, from several places of the root, the gentlest first. Some may be
-    /// in obstacles, or in the chain itself.
+    /// Returns postures at the target: arcs to both sides, from several places of the root, the gentlest first. Some
+    /// may be in obstacles, or in the chain itself.
     pub(super) fn arc_postures(&self, query: &PlanningQuery<D>) -> Vec<ChainPosture<D>> {
         let mut postures = Vec::new();
         for root_at in self.root_places(query) {
@@ -37,8 +37,8 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         postures
     }
 
-    /// Returns postures on the way to a straight one, and straight ones: the chain as it uncurls about its root, all bends
-    /// by the same share at once; then straight, across that direction to either side, and toward the target.
+    /// Returns postures on the way to a straight one, and straight ones: the chain as it uncurls about its root, all
+    /// bends by the same share at once; then straight, across that direction to either side, and toward the target.
     pub(super) fn uncurling_postures(&self, query: &PlanningQuery<D>) -> Vec<ChainPosture<D>> {
         let shares = (0..UNCURL_STEPS).rev().map(|step| step as f64 / UNCURL_STEPS as f64);
         let mut postures: Vec<_> = shares.map(|share| self.unbent_posture(share)).collect();
@@ -164,8 +164,8 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         Some(self.bent_posture(root_at, [first, second], bent_rad))
     }
 
-    /// Returns a posture whose rods from the root to the initiator bend by the same angle at each connector, from the first
-    /// direction toward the second; all other rods go straight on.
+    /// Returns a posture whose rods from the root to the initiator bend by the same angle at each connector, from the
+    /// first direction toward the second; all other rods go straight on.
     fn bent_posture(
         &self,
         root_at: Point<D>,

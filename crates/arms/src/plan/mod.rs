@@ -1,5 +1,5 @@
-//! Motion planning for chains that are free or held at one connector: a path among obstacles, and out of the chain's own
-//! way, from the present posture to one that reaches a target, where no local rule finds one.
+//! Motion planning for chains that are free or held at one connector: a path among obstacles, and out of the chain's
+//! own way, from the present posture to one that reaches a target, where no local rule finds one.
 //!
 //! ```text
 //! space.rs:  postures of rods, the straight path between two, and whether it is free
@@ -59,8 +59,8 @@ pub trait ConfigurationSpace {
     /// A node of a tree.
     type Posture: Clone;
 
-    /// Returns the largest number of random postures that trees grow toward, so that the search for a target that is cut
-    /// off ends.
+    /// Returns the largest number of random postures that trees grow toward, so that the search for a target that is
+    /// cut off ends.
     fn max_samples(&self) -> usize {
         MAX_SAMPLES
     }
@@ -111,9 +111,9 @@ pub fn plan<const D: usize>(
     Ok(path.map(|path| refined_path(&space, path)))
 }
 
-/// Returns a path with postures so near each other that it does not matter from which of them the rest is followed: on a
-/// long piece some rods turn before others, and a chain that starts in its middle would turn them in another order than
-/// the one that was checked.
+/// Returns a path with postures so near each other that it does not matter from which of them the rest is followed:
+/// on a long piece some rods turn before others, and a chain that starts in its middle would turn them in another
+/// order than the one that was checked.
 fn refined_path<const D: usize>(
     space: &ChainConfigurationSpace<'_, D>,
     path: Vec<ChainPosture<D>>,
@@ -158,8 +158,8 @@ fn find_path<S: ConfigurationSpace>(
     Some(tree::shorten_path(space, path, draws))
 }
 
-/// Returns valid postures that reach the target: arcs, and others that are sought, the first from the present posture and
-/// the rest from any, because those near the present one may be cut off from it by the chain's own body.
+/// Returns valid postures that reach the target: arcs, and others that are sought, the first from the present posture
+/// and the rest from any, because those near the present one may be cut off from it by the chain's own body.
 fn goals<const D: usize>(
     space: &ChainConfigurationSpace<'_, D>,
     rules: ReactionRules,

@@ -231,16 +231,16 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
 
 /// Steps from one posture of a path that is followed to the next.
 const REFINED_STEPS: f64 = 8.0;
-/// Pairs of rods that the random postures of a search have, all together: as many as 2,000 postures of 8 rods. A check of a
-/// posture takes time with the number of its pairs, and a search must not hold up a run.
+/// Pairs of rods that the random postures of a search have, all together: as many as 2,000 postures of 8 rods. A
+/// check of a posture takes time with the number of its pairs, and a search must not hold up a run.
 const MAX_SAMPLE_EFFORT: usize = 128_000;
 /// Random postures of a search at least.
 const MIN_SAMPLES: usize = 60;
 /// Longest move of a connector between two postures that are checked, in steps: with linear interpolation
 /// of directions, the middle of a wide turn is faster than its ends.
 const MAX_STEPS: f64 = 3.0;
-/// Largest angles by which a rod of a random posture may differ in direction from the one before, as fractions of half a
-/// turn: from nearly straight postures, which reach far, to any.
+/// Largest angles by which a rod of a random posture may differ in direction from the one before, as fractions of
+/// half a turn: from nearly straight postures, which reach far, to any.
 const STIFFNESS: [f64; 4] = [0.05, 0.15, 0.3, 1.0];
 
 fn direction<const D: usize>(draws: &mut Draws) -> Point<D> {

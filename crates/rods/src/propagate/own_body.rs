@@ -1,5 +1,5 @@
-//! Checks of a chain's own body that concern more than one reaction: of the neighbors of a part where a sweep ends, and of
-//! the paths of all parts at once.
+//! Checks of a chain's own body that concern more than one reaction: of the neighbors of a part where a sweep ends,
+//! and of the paths of all parts at once.
 
 use super::{ConnectorVeto, PropagationContext, Propagator};
 use crate::chain::Chain;
@@ -89,9 +89,9 @@ impl<const D: usize> MotionContext<'_, D> {
 }
 
 impl<const D: usize> Propagator<D> {
-    /// Returns the objection to a motion of connector `k` that brought a chain from `before` to its present place, every
-    /// connector on a straight path: an obstacle that a rod tunneled through or, where its own parts are solid, a part of
-    /// the chain. The places at its ends are not checked.
+    /// Returns the objection to a motion of connector `k` that brought a chain from `before` to its present place,
+    /// every connector on a straight path: an obstacle that a rod tunneled through or, where its own parts are solid,
+    /// a part of the chain. The places at its ends are not checked.
     pub fn find_path_veto(
         &mut self,
         chain: &Chain<D>,
@@ -117,8 +117,8 @@ impl<const D: usize> Propagator<D> {
         Some(veto(other.last_connector(), VetoReason::SelfCollision, None))
     }
 
-    /// Checks the paths of all parts that have moved against each other. Each reaction was checked against parts at rest;
-    /// that two parts pass each other, both in motion, only this check sees.
+    /// Checks the paths of all parts that have moved against each other. Each reaction was checked against parts at
+    /// rest; that two parts pass each other, both in motion, only this check sees.
     pub(super) fn check_own_paths(&self, chain: &Chain<D>) -> Result<(), ConnectorVeto> {
         if !self.rules.self_collision {
             return Ok(());

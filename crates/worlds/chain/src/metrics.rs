@@ -348,8 +348,8 @@ metrics! {
         pub steps: u64 => "steps",
         /// Vetoes that initiators received.
         pub vetoes: u64 => "vetoes",
-        /// Steps at whose end some part was deeper than 1e-6 m in an obstacle, or in another part of its chain (of chains of
-        /// more than 32 rods: by a measurement in every 16th cycle, of more than 1,024 more rarely).
+        /// Steps at whose end some part was deeper than 1e-6 m in an obstacle, or in another part of its chain (of
+        /// chains of more than 32 rods: by a measurement in every 16th cycle, of more than 1,024 more rarely).
         pub penetrations: u64 => "steps inside an obstacle or its own body",
         /// Least distance of any part from obstacles; none if nothing came near. In meters.
         pub min_clearance_m: Option<f64> => "least clearance",
@@ -370,11 +370,12 @@ metrics! {
         pub max_slave_step_m: f64 => "longest way of a follower in a sub-step",
         /// Greatest speed of any connector. In meters per second.
         pub max_speed_m_s: f64 => "greatest speed",
-        /// Most steps in a row at whose ends some part of one chain was deeper than 1e-6 m in an obstacle, or in another of
-        /// its parts.
+        /// Most steps in a row at whose ends some part of one chain was deeper than 1e-6 m in an obstacle, or in
+        /// another of its parts.
         pub longest_inside_steps: u64 => "steps inside in a row, at most",
-        /// Least distance between parts of a chain that share no joint (of more than 32 rods: in every 16th cycle, of
-        /// more than 1,024 more rarely); below 0 where they overlapped; none if none came near. In meters, while they are solid to each other.
+        /// Least gap between parts of a chain that share no joint (of more than 32 rods: in every 16th cycle, of
+        /// more than 1,024 more rarely); below 0 where they overlapped; none if none came near. In meters, while they
+        /// are solid to each other.
         pub min_own_gap_m: Option<f64> => "least distance of own parts",
         /// Tasks done, targets reached.
         pub done: u64 => "tasks done",

@@ -1,5 +1,5 @@
-//! No two parts of a chain pass through each other, whatever their proportions. The judge knows nothing of the checks that
-//! a motion makes: it looks at recorded positions, at the sign of the triple product of two rods in space and at
+//! No two parts of a chain pass through each other, whatever their proportions. The judge knows nothing of the checks
+//! that a motion makes: it looks at recorded positions, at the sign of the triple product of two rods in space and at
 //! crossings in the plane.
 
 use super::*;

@@ -38,7 +38,8 @@ fn compare<const D: usize>(seed: u64) -> [usize; 2] {
     if world.chain.connectors().iter().any(is_boxed) {
         return [0; 2];
     }
-    // With a length of its own for sub-steps; otherwise the built-in rule makes a motion that nothing can object to as one.
+    // With a length of its own for sub-steps; otherwise the built-in rule makes a motion that nothing can object to
+    // as one.
     let step_m = Some(world.chain.step_m());
     let rules = ReactionRules { rotation: RotationRule::Never, step_m, ..world.rules };
     let mut built_in = Propagator::new(rules);

@@ -15,8 +15,9 @@ struct MotionEnvironment<'a, const D: usize> {
     obstacles: &'a Obstacles<D>,
 }
 
-/// Moves a chain as requested. A chain with a connector that must stay at its position, on its line or plane, or in its box
-/// moves all parts at once, by as little as it takes; where that is blocked, by propagation and by [`reach_target`].
+/// Moves a chain as requested. A chain with a connector that must stay at its position, on its line or plane, or in
+/// its box moves all parts at once, by as little as it takes; where that is blocked, by propagation and by
+/// [`reach_target`].
 ///
 /// # Errors
 /// As [`Propagator::propagate`].
@@ -41,8 +42,8 @@ pub(crate) fn execute_request<const D: usize>(
     })
 }
 
-/// Returns the longest displacement of any connector of a chain in a cycle, meters: held chains have joints, whose speed is
-/// limited.
+/// Returns the longest displacement of any connector of a chain in a cycle, meters: held chains have joints, whose
+/// speed is limited.
 pub(crate) fn max_cycle_step_m<const D: usize>(chain: &Chain<D>, rules: &ReactionRules) -> f64 {
     let has_joints = Hold::of_chain(chain).is_some_and(|hold| hold.has_joints);
     if has_joints { rules.joint_step_max_m } else { f64::INFINITY }
@@ -53,8 +54,8 @@ pub(crate) fn max_cycle_step_m<const D: usize>(chain: &Chain<D>, rules: &Reactio
 struct Hold {
     /// The first connector that is not free to go anywhere.
     connector: usize,
-    /// Whether the chain hangs on a connector that is fixed, or on a line, a plane or in a box, so that its joints have a
-    /// speed limit; parts that hang on a failed connector swing freely.
+    /// Whether the chain hangs on a connector that is fixed, or on a line, a plane or in a box, so that its joints
+    /// have a speed limit; parts that hang on a failed connector swing freely.
     has_joints: bool,
 }
 
@@ -72,8 +73,8 @@ impl Hold {
     }
 }
 
-/// Moves a held chain: all of it at once, or by propagation and return passes where something is in the way of that. Also
-/// returns the longest displacement of a connector with which the outcome still counts as a motion, meters.
+/// Moves a held chain: all of it at once, or by propagation and return passes where something is in the way of that.
+/// Also returns the longest displacement of a connector with which the outcome still counts as a motion, meters.
 fn move_held_chain<const D: usize>(
     scene: &mut MotionEnvironment<'_, D>,
     chain: &mut Chain<D>,
@@ -90,8 +91,8 @@ fn move_held_chain<const D: usize>(
         let Err(veto) = scene.propagator.move_at_once(chain, scene.obstacles, k, target) else {
             return Ok((MotionOutcome::Moved(motion_since(before, chain, k)), jump_m));
         };
-        // Rods that turn one by one find ways past obstacles. Out of the chain's own way all parts at once move as well,
-        // and far more cheaply.
+        // Rods that turn one by one find ways past obstacles. Out of the chain's own way all parts at once move as
+        // well, and far more cheaply.
         if veto.reason == VetoReason::SelfCollision {
             return Ok((MotionOutcome::Vetoed(veto), f64::INFINITY));
         }
@@ -160,7 +161,8 @@ fn try_slowed<const D: usize>(
     Ok(MotionOutcome::Vetoed(speed_veto(k, fastest, from)))
 }
 
-/// Returns the veto of the connector that has moved farther than `most_m` from the positions before a cycle, if one has.
+/// Returns the veto of the connector that has moved farther than `most_m` from the positions before a cycle, if one
+/// has.
 pub(crate) fn find_speed_veto<const D: usize>(
     before: &[Point<D>],
     points: &[Point<D>],
@@ -282,9 +284,9 @@ fn reach_limiting_connector<const D: usize>(
 }
 
 /// Longest move of a connector, as a fraction of the longest rod, with which a posture is accepted as a
-/// motion: farther apart, two postures are not one motion of the chain. An elbow that changes its side moves by up to two
-/// rods; that of a straight arm that is drawn in moves with the square root of the tool's motion, and has to be allowed
-/// more than small steps. The half between the two was chosen, not measured.
+/// motion: farther apart, two postures are not one motion of the chain. An elbow that changes its side moves by up to
+/// two rods; that of a straight arm that is drawn in moves with the square root of the tool's motion, and has to be
+/// allowed more than small steps. The half between the two was chosen, not measured.
 const MAX_JUMP: f64 = 0.5;
 
 /// Distance at which a connector's step counts as complete, meters.

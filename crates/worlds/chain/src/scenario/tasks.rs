@@ -123,8 +123,8 @@ impl<const D: usize> TaskSection<D> {
         self.speed_m_s.map_or(DEFAULT_SPEED_M_S, f64::from)
     }
 
-    /// Returns whether it plans paths; by default where `plans_usually`, because a chain soon meets itself, or obstacles, in
-    /// ways that local rules do not solve.
+    /// Returns whether it plans paths; by default where `plans_usually`, because a chain soon meets itself, or
+    /// obstacles, in ways that local rules do not solve.
     fn has_planner(&self, plans_usually: bool) -> bool {
         match self.planner {
             Some(planner) => planner == PlannerWord::RrtConnect,
@@ -182,9 +182,9 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         })
     }
 
-    /// Returns whether tasks of a chain plan paths unless they say otherwise: with a fixed base always, and otherwise where
-    /// its own body can be in its way and plans are cheap and stay right, because the chain is short, held at one connector
-    /// at most, moved as a whole, and nothing moves around it.
+    /// Returns whether tasks of a chain plan paths unless they say otherwise: with a fixed base always, and otherwise
+    /// where its own body can be in its way and plans are cheap and stay right, because the chain is short, held at
+    /// one connector at most, moved as a whole, and nothing moves around it.
     fn plans_usually(&self, section: &ChainSection<D>, chain: &Chain<D>) -> bool {
         let held = chain.connectors().iter().filter(|c| c.mobility != Mobility::Free).count();
         let has_base = chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed);

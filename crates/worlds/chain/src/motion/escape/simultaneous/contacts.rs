@@ -99,8 +99,8 @@ impl<const D: usize> Contacts<D> {
     }
 }
 
-/// Distance within which a body is a contact, as a multiple of a connector's longest displacement: two parts may each go
-/// as far as from one side of their start to the other.
+/// Distance within which a body is a contact, as a multiple of a connector's longest displacement: two parts may each
+/// go as far as from one side of their start to the other.
 const CONTACT_RANGE_FACTOR: f64 = 4.0;
 
 /// Returns the box around a rod and its connectors, grown by `by_m`.
