@@ -78,7 +78,7 @@ pub fn plan_to_goal<const D: usize>(
         }
     };
     let free = postures.into_iter().filter(|posture| space.is_free(posture));
-    Ok(find_path(space, free.take(MAX_GOALS).collect(), draws))
+    Ok(find_path(space, Vec::new(), free.take(MAX_GOALS).collect(), draws))
 }
 
 /// Plans the straight line of the tip from where it is to a pose, turning evenly: the joint values after the present
