@@ -342,10 +342,10 @@ fn the_links_of_an_arm_are_what_must_not_touch() {
     let tally = run.world().chain_metrics(run.state(), 0).tally;
     assert!((tally.min_clearance_m - least_m).abs() < 1e-9, "{}", tally.min_clearance_m);
     assert_eq!(tally.penetrations, 0);
-    // As rods of that radius it overlaps the wall at the start already.
+    // As connectors of a radius its tool overlaps the wall at the start already.
     let text = format!(
         "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n{wall}\n[[chains]]\narm = {{ urdf_text = \"\"\"{}\"\"\", \
-         joints = [0.3, 0.5, 0.4], body = \"rods\" }}\nradius_m = 0.2\nrod_radius_m = 0.15\n[[chains.tasks]]\n{task}",
+         joints = [0.3, 0.5, 0.4], body = \"rods\" }}\nradius_m = 0.3\nrod_radius_m = 0.15\n[[chains.tasks]]\n{task}",
         boxed()
     );
     let source = Source::new("s.toml", &text, root());
