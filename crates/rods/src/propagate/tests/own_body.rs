@@ -98,7 +98,7 @@ enum Hold {
 fn any_chain<const D: usize>(numbers: &mut TestRng, hold: Hold) -> Chain<D> {
     let n_rods = 4 + (22.0 * numbers.unit()) as usize;
     // As many thin ones as thick ones, by magnitude.
-    let part = 0.005 * sidestep_kernel::math::exp(numbers.unit() * 100.0_f64.ln());
+    let part = 0.005 * sidestep_kernel::math::exp(2.0 * numbers.unit() * std::f64::consts::LN_10);
     let radius_m = part.min(0.5);
     let rod_radius_m = if numbers.unit() < 0.5 { radius_m } else { radius_m * numbers.unit() };
     let slack_m = if numbers.unit() < 0.5 { 0.0 } else { 0.003 };

@@ -22,7 +22,7 @@ use sidestep_rods::geometry::{Point, add_scaled, convert_dimensions, distance, m
 
 /// Fraction of a cycle's step by which an initiator has to come nearer to its target for that to count: a chain that
 /// slides along itself by a hair in each cycle does not get there.
-const MIN_GAIN_FRACTION: f64 = 0.02;
+const MIN_GAIN_FRACTION: f64 = 0.001;
 /// The same of an arm's tool, whose joints must be able to stop: one that grazes an obstacle creeps on, and a plan leads it
 /// there sooner.
 const MIN_ARM_GAIN_FRACTION: f64 = 0.1;

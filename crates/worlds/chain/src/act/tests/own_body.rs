@@ -92,7 +92,7 @@ fn a_chain_that_overlaps_at_the_start_is_refused_with_the_parts_and_the_depth() 
              rod_m = [0.5, 2.0]\nradius_m = 0.05\nrod_radius_m = 0.02\ntasks = [{{ kind = \"rest\" }}]\n"
         )
     };
-    let error = ChainScenario::<2>::new(&scenario(&crossed(""))).err().expect("it overlaps");
+    let error = ChainScenario::<2>::new(&scenario(&crossed(""))).expect_err("it overlaps");
     let error = error.to_string();
     assert!(error.contains("rod 0 4.000e-2 m deep in its rod 2"), "{error}");
     for remedy in ["self_collision = false", "may_start_inside = true"] {
