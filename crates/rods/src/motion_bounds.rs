@@ -88,11 +88,34 @@ impl<const D: usize> GapBudget<D> {
     }
 }
 
+/// The sizes of a connector and of the rod behind it, if there is one, on which gaps depend, meters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct PartSizes {
+    connector_radius_m: f64,
+    rod_radius_m: f64,
+    rod_min_m: f64,
+    rod_max_m: f64,
+}
+
+fn part_sizes<const D: usize>(chain: &Chain<D>) -> impl Iterator<Item = PartSizes> {
+    chain.connectors().iter().enumerate().map(|(i, connector)| {
+        let rod = chain.rods().get(i);
+        PartSizes {
+            connector_radius_m: connector.radius_m,
+            rod_radius_m: rod.map_or(0.0, |rod| rod.radius_m),
+            rod_min_m: rod.map_or(0.0, |rod| rod.min_m),
+            rod_max_m: rod.map_or(0.0, |rod| rod.max_m),
+        }
+    })
+}
+
 /// Distances of a chain's parts from all others that can be in their way, with the travel since.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SeparationBounds<const D: usize> {
     /// Positions to which the odometer has counted.
     points: Vec<Point<D>>,
+    /// The sizes of the parts whose gaps were measured.
+    sizes: Vec<PartSizes>,
     /// Twice the sum of the longest travel of each motion so far, meters: two parts approach each other at
     /// most by the travel of both.
     odometer_m: f64,
@@ -103,7 +126,9 @@ pub(super) struct SeparationBounds<const D: usize> {
 impl<const D: usize> SeparationBounds<D> {
     /// Records the positions of a chain, which may be another one or have been changed from outside.
     pub(super) fn record(&mut self, chain: &Chain<D>) {
-        if self.points.len() != chain.points().len() || self.odometer_m > MAX_ODOMETER_M {
+        // Of another chain neither the number of parts nor their sizes have to be the same.
+        let is_same_chain = self.sizes.iter().copied().eq(part_sizes(chain));
+        if !is_same_chain || self.odometer_m > MAX_ODOMETER_M {
             self.reset(chain);
         } else if self.points != chain.points() {
             let moves = self.points.iter().zip(chain.points()).map(|(old, new)| sub(*new, *old));
@@ -117,6 +142,8 @@ impl<const D: usize> SeparationBounds<D> {
     fn reset(&mut self, chain: &Chain<D>) {
         self.points.clear();
         self.points.extend_from_slice(chain.points());
+        self.sizes.clear();
+        self.sizes.extend(part_sizes(chain));
         self.odometer_m = 0.0;
         let rods = chain.rods().len();
         self.rods.reset(rods);
@@ -183,7 +210,9 @@ impl<const D: usize> SeparationBounds<D> {
                 .fold(f64::INFINITY, |least, advance| if advance < least { advance } else { least })
         };
         let least = advance(after).min(advance(before));
-        least >= (chain.neighbor_separation_m() + MARGIN_M) * norm(along)
+        // A stretch that closes to a ring has no direction.
+        let length_m = norm(along);
+        length_m > 0.0 && least >= (chain.neighbor_separation_m() + MARGIN_M) * length_m
     }
 
     /// Returns whether the parts of a stretch that are near each other along the chain keep their distances, at the
@@ -277,9 +306,13 @@ impl<const D: usize> SeparationBounds<D> {
     /// Returns whether a block is at least `needed_m` from all blocks that are not beside it along the chain, by their
     /// boxes.
     fn is_block_apart(&mut self, chain: &Chain<D>, block: usize, needed_m: f64) -> bool {
-        if self.blocks.until_m[block] - self.odometer_m < needed_m + SLACK_M {
+        // The distance of two boxes falls by more than that of their parts, because a different part may move along each
+        // axis. All of that is counted: else a gap that was measured before would allow a motion that one measured now
+        // does not, and the bits would depend on what else the worker has done.
+        let odometer_m = self.odometer_m * (D as f64).sqrt();
+        if self.blocks.until_m[block] - odometer_m < needed_m + SLACK_M {
             let gap_m = self.measure_block_gap_m(chain, block, needed_m);
-            self.blocks.until_m[block] = self.odometer_m + gap_m;
+            self.blocks.until_m[block] = odometer_m + gap_m;
             return gap_m >= needed_m;
         }
         true

@@ -20,6 +20,9 @@ use std::ops::Range;
 /// turn keep a skin, and without this room each direction would be blocked by it.
 const TURN_ROOM_M: f64 = 10.0 * SKIN_M;
 
+/// Rounding of gaps, meters.
+const ROUNDING_M: f64 = 1e-12;
+
 /// A part of a chain; the order breaks ties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChainPart {
@@ -155,27 +158,61 @@ pub fn nearest_own_parts<const D: usize>(
     tree: &mut RodBvh<D>,
     within_m: f64,
 ) -> Option<NearestOwnParts> {
+    let mut nearest: Option<NearestOwnParts> = None;
+    visit_near_parts(chain, tree, within_m, |found| {
+        nearest = Some(found);
+        found.gap_m
+    });
+    nearest
+}
+
+/// Returns the two parts that overlap most, by more than `tolerance_m` and deeper than where the connectors were at
+/// `before`; of equal ones the first in order. `tree` is a buffer.
+pub(super) fn deepest_new_overlap<const D: usize>(
+    chain: &Chain<D>,
+    before: &[Point<D>],
+    tree: &mut RodBvh<D>,
+    tolerance_m: f64,
+) -> Option<NearestOwnParts> {
+    let mut deepest: Option<NearestOwnParts> = None;
+    visit_near_parts(chain, tree, -tolerance_m, |found| {
+        let was_m = chain.own_gap_m(before, found.parts).unwrap_or(0.0);
+        let is_deeper = found.gap_m < was_m - ROUNDING_M;
+        if is_deeper && deepest.is_none_or(|deepest| found.gap_m < deepest.gap_m) {
+            deepest = Some(found);
+        }
+        -tolerance_m
+    });
+    deepest
+}
+
+/// Visits the pairs of a chain's parts that may not touch and have a gap of less than `within_m`, in order; `visit`
+/// returns the gap below which others are of interest.
+fn visit_near_parts<const D: usize>(
+    chain: &Chain<D>,
+    tree: &mut RodBvh<D>,
+    within_m: f64,
+    mut visit: impl FnMut(NearestOwnParts) -> f64,
+) {
     let points = chain.points();
     let rods = chain.rods().len();
     let ends = |rod: usize| ChainPart::Rod(rod).ends(points);
     tree.refit((0..rods).map(|rod| chain.rod_bounds(rod, ends(rod), 0.0)));
-    let mut nearest: Option<NearestOwnParts> = None;
+    let mut within_m = within_m;
     for rod in 0..rods {
-        let least_m = nearest.map_or(within_m, |nearest| nearest.gap_m);
-        let near = chain.rod_bounds(rod, ends(rod), least_m);
+        let near = chain.rod_bounds(rod, ends(rod), within_m);
         tree.visit(&near, |other| {
             if other < rod {
                 return;
             }
             for parts in part_pairs(rod, other, rods) {
                 let Some(gap_m) = chain.own_gap_m(points, parts) else { continue };
-                if gap_m < nearest.map_or(within_m, |nearest| nearest.gap_m) {
-                    nearest = Some(NearestOwnParts { parts, gap_m });
+                if gap_m < within_m {
+                    within_m = visit(NearestOwnParts { parts: sorted(parts), gap_m });
                 }
             }
         });
     }
-    nearest.map(|nearest| NearestOwnParts { parts: sorted(nearest.parts), ..nearest })
 }
 
 fn sorted([one, other]: [ChainPart; 2]) -> [ChainPart; 2] {

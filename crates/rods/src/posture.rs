@@ -4,7 +4,7 @@ use super::chain::{Chain, LENGTH_TOLERANCE_M};
 use super::geometry::{Aabb, Point, angle_between_rad, distance, sub};
 use super::motion_context::{BEND_TOLERANCE_RAD, TOLERANCE_M};
 use super::obstacle::Obstacles;
-use super::own_body::{ChainPart, nearest_own_parts};
+use super::own_body::{ChainPart, deepest_new_overlap};
 use super::propagate::Propagator;
 use super::rod_bvh::RodBvh;
 use super::veto::{Veto, VetoReason};
@@ -43,11 +43,8 @@ impl<const D: usize> Propagator<D> {
             return None;
         }
         let mut tree = RodBvh::default();
-        let nearest = nearest_own_parts(chain, &mut tree, -TOLERANCE_M)?;
-        let was_m = chain.own_gap_m(before, nearest.parts).unwrap_or(0.0);
-        let [_, other] = nearest.parts;
-        let is_deeper = nearest.gap_m < was_m - ROUNDING_M;
-        is_deeper.then_some((other.last_connector(), VetoReason::SelfCollision, None))
+        let [_, other] = deepest_new_overlap(chain, before, &mut tree, TOLERANCE_M)?.parts;
+        Some((other.last_connector(), VetoReason::SelfCollision, None))
     }
 }
 

@@ -27,7 +27,7 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
     /// Returns the postures to which connector `k` can bring a chain.
     ///
     /// # Errors
-    /// When the chain is held at several connectors that would all have to move or to stay.
+    /// When the chain has no rods, or is held at several connectors that would all have to move or to stay.
     pub fn new(
         chain: &'a Chain<D>,
         obstacles: &'a Obstacles<D>,
@@ -35,6 +35,10 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
         k: usize,
     ) -> Result<Self, InputError> {
         let n = chain.points().len();
+        if n < 2 {
+            let remedy = "set planner = \"none\", or give two connectors or more";
+            return Err(InputError::new("planner", "a chain without rods has no postures", remedy));
+        }
         let connectors = chain.connectors();
         let is_held = |c: &Connector<D>| c.failed || c.mobility != Mobility::Free;
         let below = (0..k).rev().find(|&i| is_held(&connectors[i]));

@@ -190,3 +190,48 @@ fn no_two_parts_pass_through_each_other_at_any_proportion() {
 fn no_two_parts_of_many_more_chains_pass_through_each_other() {
     lead_many(25..1500);
 }
+
+/// A chain that is about to close to a ring has no direction along which all of its rods point forward.
+#[test]
+fn the_ends_of_a_chain_do_not_meet_in_one_place() {
+    let rod = Rod { min_m: 0.5, max_m: 1.5, radius_m: 0.05 };
+    let points = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let mut chain = Chain::new(points, vec![Connector::free(0.05); 4], vec![rod; 3]).unwrap();
+    let rules = ReactionRules { self_collision: true, ..ReactionRules::default() };
+    let mut propagator = Propagator::new(rules);
+    let mode = VetoEffect::AsFarAsPossible;
+    let request = MotionRequest { mode, ..MotionRequest::from_operator(3, [0.0, 0.0]) };
+    propagator.propagate(&mut chain, &Obstacles::default(), &request).unwrap();
+    let apart_m = distance(chain.points()[0], chain.points()[3]);
+    assert!(apart_m > 0.1 - TOLERANCE_M, "{apart_m}");
+}
+
+/// The gaps of a thin chain say nothing about a thick one of as many connectors at the same places.
+#[test]
+fn chains_that_share_a_propagator_move_as_if_each_had_its_own() {
+    let rules = ReactionRules { self_collision: true, ..ReactionRules::default() };
+    let mut shared = Propagator::<2>::new(rules);
+    for seed in 0..20 {
+        let thin_rod = Rod { min_m: 0.4, max_m: 0.5, radius_m: 0.005 };
+        let thin = crooked::<2>(seed, 40, thin_rod, 0.01);
+        let thick_rod = Rod { radius_m: 0.08, ..thin_rod };
+        let points = thin.points().to_vec();
+        let thick =
+            Chain::new(points, vec![Connector::free(0.1); 41], vec![thick_rod; 40]).unwrap();
+        let mut own = Propagator::new(rules);
+        let mut chains = [thin, thick.clone()];
+        let mut alone = thick;
+        let mut walk = Wanderer::new(seed);
+        for step in 0..60 {
+            let to = walk.next(alone.points()[0], 0.1);
+            let mode = VetoEffect::AsFarAsPossible;
+            let request = MotionRequest { mode, ..MotionRequest::from_operator(0, to) };
+            let obstacles = Obstacles::default();
+            for chain in &mut chains {
+                shared.propagate(chain, &obstacles, &request).unwrap();
+            }
+            own.propagate(&mut alone, &obstacles, &request).unwrap();
+            assert_eq!(bits(&chains[1]), bits(&alone), "{seed} {step}");
+        }
+    }
+}

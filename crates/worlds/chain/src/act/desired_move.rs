@@ -147,8 +147,9 @@ fn step_to_target<const D: usize>(
         return step_to_joint_goal(initiator, acting, targets, goal);
     }
     let left_m = distance(at, target);
-    let is_arm = initiator.context.spec.arm.is_some();
-    let min_gain_fraction = if is_arm { MIN_ARM_GAIN_FRACTION } else { MIN_GAIN_FRACTION };
+    let is_planning_arm =
+        initiator.context.spec.arm.is_some() && initiator.task.plans_after_s.is_some();
+    let min_gain_fraction = if is_planning_arm { MIN_ARM_GAIN_FRACTION } else { MIN_GAIN_FRACTION };
     let min_gain_m = (min_gain_fraction * initiator.step_m()).min(left_m);
     let comes_nearer = driving.nearest_m - left_m > min_gain_m;
     // On a planned path a chain goes away from its target at first, and that is no time lost.

@@ -6,7 +6,7 @@ use crate::clearance::min_clearance;
 use crate::events::EventKind;
 use crate::metrics::PENETRATION_THRESHOLD_M;
 use sidestep_rods::geometry::distance;
-use sidestep_rods::{Chain, RodBvh, nearest_own_parts};
+use sidestep_rods::{RodBvh, nearest_own_parts};
 
 /// Number of rods up to which a chain's gap to itself is measured in each cycle: the measurement takes time that
 /// grows faster than the chain.
@@ -38,16 +38,20 @@ pub(super) fn measure_chain<const D: usize>(
     if is_whole {
         tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
     }
+    let mut own_part = None;
     // Parts that cross stay crossed for many cycles, so rare measurements of a long chain find them, too.
     let rods = chain.rods().len();
     let interval = MEASURE_INTERVAL_CYCLES * rods.div_ceil(RODS_PER_INTERVAL) as u64;
     let is_due = rods <= MAX_MEASURED_RODS || now.is_multiple_of(interval);
     if is_whole && is_due && world.rules.self_collision {
-        let gap_m = match &arm {
-            Some(arm) => arm.own_m,
-            None => own_gap_m(chain, own, tally.own_gap_to_find_m(look_m)),
-        };
-        tally.add_own_gap(gap_m);
+        match &arm {
+            Some(arm) => tally.add_own_gap(arm.own_m),
+            None => {
+                let nearest = nearest_own_parts(chain, own, tally.own_gap_to_find_m(look_m));
+                own_part = nearest.map(|nearest| nearest.parts[0].connector());
+                tally.add_own_gap(nearest.map_or(f64::INFINITY, |nearest| nearest.gap_m));
+            }
+        }
     }
     let (least_m, part) = match &arm {
         Some(arm) => (arm.obstacles_m, arm.connector),
@@ -61,11 +65,8 @@ pub(super) fn measure_chain<const D: usize>(
     let is_inside = is_in_obstacle || own_depth_m > PENETRATION_THRESHOLD_M;
     if tally.record_inside(is_inside) {
         let kind = if is_inside { EventKind::Penetration } else { EventKind::Clear };
+        // The part that is deepest: in another one of the chain, or in an obstacle.
+        let part = own_part.filter(|_| own_depth_m > -least_m).unwrap_or(part);
         acting.sink.record(chain, kind, part, own_depth_m.max(-least_m).max(0.0));
     }
-}
-
-/// Returns the gap of a chain to itself in meters, negative where parts overlap; infinite if it is more than `within_m`.
-fn own_gap_m<const D: usize>(chain: &Chain<D>, own: &mut RodBvh<D>, within_m: f64) -> f64 {
-    nearest_own_parts(chain, own, within_m).map_or(f64::INFINITY, |nearest| nearest.gap_m)
 }

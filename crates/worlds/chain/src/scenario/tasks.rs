@@ -191,8 +191,12 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let is_alone = self.file.chain.deployment == Deployment::Direct
             && self.file.chain.self_collision != Some(false)
             && section.robots.is_none()
-            && !self.has_movers();
-        held <= 1 && (has_base || is_alone && chain.rods().len() <= MAX_PLANNED_RODS)
+            && !self.has_movers()
+            && self.file.chains.0.iter().map(|section| section.get_ref().count).sum::<usize>() == 1;
+        // A single connector has no posture to plan.
+        !chain.rods().is_empty()
+            && held <= 1
+            && (has_base || is_alone && chain.rods().len() <= MAX_PLANNED_RODS)
     }
 
     /// Refuses a planner for a chain whose postures it does not know.
@@ -201,6 +205,12 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         section: &Spanned<TaskSection<D>>,
         chain: &Chain<D>,
     ) -> Result<(), InputError> {
+        let planner_span = || self.source.key_span(section.span(), &["planner"]);
+        if chain.rods().is_empty() {
+            let cause = "a planner for a chain of one connector";
+            let remedy = "leave it out: there are no rods whose posture it could plan";
+            return Err(self.source.error(planner_span(), cause, remedy));
+        }
         let mut held = chain.connectors().iter().enumerate();
         let is_held = |(_, c): &(usize, &Connector<D>)| c.mobility != Mobility::Free;
         let (Some((low, _)), Some((high, _))) = (held.find(is_held), held.find(is_held)) else {
@@ -208,8 +218,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         };
         let cause = format!("a planner for a chain that is held at connectors {low} and {high}");
         let remedy = "leave it out, or hold the chain at one connector at most";
-        let at = self.source.key_span(section.span(), &["planner"]);
-        Err(self.source.error(at, cause, remedy))
+        Err(self.source.error(planner_span(), cause, remedy))
     }
 
     fn driver(
