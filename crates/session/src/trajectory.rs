@@ -15,7 +15,7 @@ const TABLE: &str = "joints";
 pub struct ArmTrajectory {
     /// The number of its chain.
     pub chain: u32,
-    /// The name of its chain, or `chain_` and its number; names of ROS: letters, digits and `_`.
+    /// The name of its chain, or `chain_` and its number, with another number behind where a chain has that name; names of ROS: letters, digits and `_`.
     pub name: String,
     /// The names of its joints, from base to tip.
     pub joints: Vec<String>,
@@ -64,14 +64,25 @@ pub fn arm_trajectories(
         scenery.names.iter().map(|(_, number, name)| (*number, name)).collect();
     let mut trajectories = Vec::new();
     for (chain, rows) in arms {
-        let name = names.get(&chain).map(|name| ros_name(name)).unwrap_or_default();
-        let is_taken = trajectories.iter().any(|other: &ArmTrajectory| other.name == name);
-        // Names of topics begin with a letter.
-        let is_name = name.starts_with(|c: char| c.is_ascii_alphabetic()) && !is_taken;
-        let name = if is_name { name } else { format!("chain_{chain}") };
+        let given = names.get(&chain).map(|name| name.as_str());
+        let is_taken =
+            |name: &str| trajectories.iter().any(|other: &ArmTrajectory| other.name == name);
+        let name = arm_name(given, chain, is_taken);
         trajectories.push(rows.trajectory(chain, name, scenery.cycle_s, starts_run));
     }
     Ok(trajectories)
+}
+
+/// Returns the name of an arm that no other has taken: that of its chain, or else one of its chain's number.
+fn arm_name(given: Option<&str>, chain: u32, is_taken: impl Fn(&str) -> bool) -> String {
+    // Names of topics begin with a letter.
+    let named =
+        given.map(ros_name).filter(|name| name.starts_with(|c: char| c.is_ascii_alphabetic()));
+    let numbered = std::iter::once(format!("chain_{chain}"));
+    // Other chains may have the names that this one would get from its number.
+    let others = (2_u32..).map(|n| format!("chain_{chain}_{n}"));
+    let mut names = named.into_iter().chain(numbered).chain(others);
+    names.find(|name| !is_taken(name)).unwrap_or_default()
 }
 
 /// Returns a name without characters that a topic may not have.
@@ -165,6 +176,20 @@ fn add_block(arms: &mut BTreeMap<u32, JointRows>, block: &Table, every: Cycle) -
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_two_arms_have_one_name() {
+        let mut taken: Vec<String> = Vec::new();
+        for (chain, given) in [Some("chain_1"), None, Some("left arm"), Some("left_arm"), Some("4")]
+            .into_iter()
+            .enumerate()
+        {
+            let name =
+                arm_name(given, chain as u32, |name| taken.iter().any(|other| other == name));
+            taken.push(name);
+        }
+        assert_eq!(taken, ["chain_1", "chain_1_2", "left_arm", "chain_3", "chain_4"]);
+    }
 
     #[test]
     fn rates_are_those_of_a_parabola_also_at_uneven_times() {
