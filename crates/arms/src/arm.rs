@@ -6,6 +6,7 @@ use super::kinematics::{
 use super::motion::MotionFilter;
 use sidestep_import::report::Finding;
 use sidestep_import::urdf::Solid;
+use sidestep_import::urdf::joint_limits::GivenRates;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, convert_dimensions, sub};
 use sidestep_rods::{Chain, Connector, Mobility, Rod};
@@ -17,6 +18,15 @@ const MIN_ROD_M: f64 = 1e-6;
 const MAX_ROD_M: f64 = 1e6;
 /// Least bend limit of a connector, rad: a joint whose limits meet would give 0, which a chain refuses.
 const MIN_BEND_RAD: f64 = 1e-9;
+
+/// Where the highest rates of an arm's joints are from, beside its model.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RateSources {
+    /// The names of joints whose highest speed is assumed, because nothing gives it.
+    pub assumed_speeds: Vec<String>,
+    /// The rates that no joint exceeds, whatever it may by itself.
+    pub at_most: GivenRates,
+}
 
 /// An arm: its joints, its connectors, and the place of its base.
 #[derive(Debug)]
@@ -33,6 +43,8 @@ pub struct Arm {
     pub follower: ConnectorTargetSolver,
     /// Keeps the joints to their rates.
     pub motion: MotionFilter,
+    /// Where the rates of its motion are from.
+    pub rate_sources: RateSources,
     /// The shapes of its links, which then must not touch anything, in place of its rods; none where its rods count.
     pub body: Option<ArmBody>,
     /// Parts of its body that overlap at the start, by name with their depth in m: they may.
@@ -57,6 +69,7 @@ impl Arm {
             at_m,
             follower,
             motion,
+            rate_sources: RateSources::default(),
             body: None,
             exempt_overlaps: Vec::new(),
             solids: Vec::new(),

@@ -7,5 +7,5 @@ pub mod kinematics;
 pub mod motion;
 pub mod plan;
 
-pub use arm::Arm;
+pub use arm::{Arm, RateSources};
 pub use sidestep_kernel::InputError;

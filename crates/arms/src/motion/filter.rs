@@ -27,6 +27,7 @@
 //! specifications", Control Engineering Practice 20, 2012.
 
 use super::rates::JointRates;
+use sidestep_kernel::InputError;
 use std::collections::VecDeque;
 
 /// Longest window in which speeds are smoothed, s: an arm follows its reference half of it later. Where a joint takes
@@ -39,6 +40,10 @@ const MAX_ACCELERATION_WINDOW_S: f64 = 0.25;
 const RATE_FRACTION: f64 = 1.0 - 1e-6;
 /// Tolerance of a number of cycles: a window of exactly a number of cycles must not become one longer by rounding.
 const CYCLE_TOLERANCE: f64 = 1e-6;
+/// Largest number of cycles of both windows together: the longest ones at 5 kHz, more than controllers of arms run at.
+/// Each cycle costs as many postures.
+const MAX_WINDOW_CYCLES: usize = 4096;
+const MICROSECONDS_PER_S: f64 = 1e6;
 
 /// The smoothing of an arm's joints in cycles of fixed length.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,14 +80,19 @@ pub struct MotionStep {
 
 impl MotionFilter {
     /// Returns the smoothing for joints with these rates, in cycles of `dt_s`.
-    pub fn new(rates: Vec<JointRates>, dt_s: f64) -> Self {
+    ///
+    /// # Errors
+    /// When the windows are longer than 4,096 cycles.
+    pub fn new(rates: Vec<JointRates>, dt_s: f64) -> Result<Self, InputError> {
         let longest =
             |window_s: fn(&JointRates) -> f64| rates.iter().map(window_s).fold(0.0, f64::max);
         let speed_s = longest(|rates| rates.speed / rates.acceleration).min(MAX_SPEED_WINDOW_S);
         // From one acceleration to the opposite one.
         let acceleration_s = longest(|rates| 2.0 * rates.acceleration / rates.jerk);
+        let acceleration_s = acceleration_s.min(MAX_ACCELERATION_WINDOW_S);
+        check_windows(speed_s, acceleration_s, dt_s)?;
         let speed_window = cycles(speed_s, dt_s);
-        let acceleration_window = cycles(acceleration_s.min(MAX_ACCELERATION_WINDOW_S), dt_s);
+        let acceleration_window = cycles(acceleration_s, dt_s);
         let used = rates.iter().map(|rates| {
             let rates = rates.scaled(RATE_FRACTION);
             let jerk_limited = 0.5 * rates.jerk * acceleration_window as f64 * dt_s;
@@ -90,13 +100,13 @@ impl MotionFilter {
             let speed = rates.speed.min(acceleration * speed_window as f64 * dt_s);
             JointRates { speed, acceleration, ..rates }
         });
-        Self {
+        Ok(Self {
             dt_s,
             used: used.collect(),
             speed_window,
             weights: weights(speed_window, acceleration_window),
             rates,
-        }
+        })
     }
 
     /// Returns the highest rates of each joint.
@@ -108,11 +118,6 @@ impl MotionFilter {
     /// joint would take longer than half a second to reach that.
     pub fn reference_speeds(&self) -> impl Iterator<Item = f64> + '_ {
         self.used.iter().map(|rates| rates.speed)
-    }
-
-    /// Returns the number of cycles after which the joints are where a reference rests.
-    pub fn delay_cycles(&self) -> usize {
-        self.weights.len() - 1
     }
 
     /// Returns the ranges of each joint in which the next reference has to be, within `limits`; each contains the last
@@ -136,23 +141,6 @@ impl MotionFilter {
                 .push([(last + back).max(*lower).min(last), (last + ahead).min(*upper).max(last)]);
         }
         ranges
-    }
-
-    /// Returns the fraction, at most 1, of the way from the last reference to another that the next one may take.
-    pub fn reachable_fraction(&self, state: &MotionState, joints: &[f64], to: &[f64]) -> f64 {
-        let unlimited = vec![[f64::NEG_INFINITY, f64::INFINITY]; joints.len()];
-        let ranges = self.reference_ranges(state, joints, &unlimited);
-        let last = state.reference(joints);
-        let mut fraction: f64 = 1.0;
-        for ((from, to), [lower, upper]) in last.iter().zip(to).zip(ranges) {
-            let change = to - from;
-            if change > 0.0 {
-                fraction = fraction.min((upper - from) / change);
-            } else if change < 0.0 {
-                fraction = fraction.min((lower - from) / change);
-            }
-        }
-        fraction
     }
 
     /// Returns the postures of the coming cycles if the reference goes to `reference` in this one and then rests; the
@@ -292,19 +280,33 @@ impl MotionState {
     }
 }
 
+/// Returns an error if windows of these durations have more cycles of `dt_s` together than are smoothed.
+fn check_windows(speed_s: f64, acceleration_s: f64, dt_s: f64) -> Result<(), InputError> {
+    let smoothed_s = speed_s + acceleration_s;
+    let most_cycles = MAX_WINDOW_CYCLES as f64;
+    if smoothed_s / dt_s <= most_cycles {
+        return Ok(());
+    }
+    // Rounded up, so that the number is valid as it stands.
+    let least_dt_s = (smoothed_s / most_cycles * MICROSECONDS_PER_S).ceil() / MICROSECONDS_PER_S;
+    let cause = format!(
+        "the joints are smoothed over {smoothed_s:.3} s, more than {MAX_WINDOW_CYCLES} cycles of {dt_s:e} s"
+    );
+    let remedy = format!(
+        "give chain.dt_s = {least_dt_s} or more, or joints a higher max_acceleration or max_jerk"
+    );
+    Err(InputError::new("the motion of the joints", cause, remedy))
+}
+
 /// Returns the least number of cycles that are at least so long.
 fn cycles(window_s: f64, dt_s: f64) -> usize {
     ((window_s / dt_s - CYCLE_TOLERANCE).ceil() as usize).max(1)
 }
 
-/// Returns the weights of a mean over `first` cycles of which a mean over `second` cycles is taken.
+/// Returns the weights of a mean over `first` cycles of which a mean over `second` cycles is taken: a trapezoid.
 fn weights(first: usize, second: usize) -> Vec<f64> {
-    let mut counts = vec![0_u32; first + second - 1];
-    for a in 0..first {
-        for b in 0..second {
-            counts[a + b] += 1;
-        }
-    }
+    let len = first + second - 1;
     let all = (first * second) as f64;
-    counts.into_iter().map(|count| f64::from(count) / all).collect()
+    let count = |i: usize| (i + 1).min(len - i).min(first).min(second);
+    (0..len).map(|i| count(i) as f64 / all).collect()
 }

@@ -42,7 +42,8 @@ fn lead(filter: &MotionFilter, to: f64) -> Vec<f64> {
 #[test]
 fn a_motion_from_rest_to_rest_has_seven_segments() {
     let dt_s = 1e-3;
-    let filter = MotionFilter::new(vec![rates(1.0, 4.0, 100.0)], dt_s);
+    let filter =
+        MotionFilter::new(vec![rates(1.0, 4.0, 100.0)], dt_s).expect("windows of few cycles");
     // 1.0 / 4.0 s, 2 * 4.0 / 100.0 s, and 1.5 rad at 1 rad/s.
     let times_s = [0.25, 0.08, 1.5];
     let positions = lead(&filter, 1.5);
@@ -59,7 +60,8 @@ fn a_motion_from_rest_to_rest_has_seven_segments() {
 #[test]
 fn without_a_jerk_limit_the_profile_is_a_trapezoid() {
     let dt_s = 1e-3;
-    let filter = MotionFilter::new(vec![rates(0.5, 2.0, 1e9)], dt_s);
+    let filter =
+        MotionFilter::new(vec![rates(0.5, 2.0, 1e9)], dt_s).expect("windows of few cycles");
     for (k, position) in lead(&filter, 1.0).into_iter().enumerate() {
         let t = (k + 1) as f64 * dt_s;
         // 0.5 rad/s after 0.25 s, braking from 2 s on.
@@ -74,15 +76,46 @@ fn without_a_jerk_limit_the_profile_is_a_trapezoid() {
 
 #[test]
 fn a_slow_drive_is_led_more_slowly_instead_of_late() {
-    let filter = MotionFilter::new(vec![rates(2.0, 0.5, 1e9)], 0.02);
+    let filter =
+        MotionFilter::new(vec![rates(2.0, 0.5, 1e9)], 0.02).expect("windows of few cycles");
     let speeds: Vec<f64> = filter.reference_speeds().collect();
     assert!((speeds[0] - 0.25).abs() < 1e-5, "{speeds:?}");
-    assert_eq!(filter.delay_cycles(), 24);
+    // Half a second in cycles of 20 ms: with the last of 25 postures the joints are at a reference that rests.
+    assert_eq!(filter.stop_postures(&MotionState::default(), &[0.0], &[0.001]).len(), 25);
+}
+
+#[test]
+fn a_cycle_too_short_for_the_windows_is_refused_with_one_that_is_long_enough() {
+    let with_dt_s = |dt_s: f64| MotionFilter::new(vec![rates(1.0, 4.0, 100.0)], dt_s);
+    for dt_s in [1e-300, 1e-8] {
+        let error = with_dt_s(dt_s).expect_err("too short");
+        assert!(error.cause().contains("0.330 s, more than 4096 cycles"), "{}", error.cause());
+        assert!(error.remedy().contains("chain.dt_s = 0.000081 or more"), "{}", error.remedy());
+    }
+    let filter = with_dt_s(0.000_081).expect("long enough");
+    let stop = filter.stop_postures(&MotionState::default(), &[0.0], &[1e-6]);
+    assert_eq!(stop.last(), Some(&vec![1e-6]));
+}
+
+#[test]
+fn a_step_of_the_reference_is_followed_as_the_mean_of_means() {
+    let filter =
+        MotionFilter::new(vec![rates(1.0, 4.0, 100.0)], 0.01).expect("windows of few cycles");
+    // 0.25 s and 0.08 s.
+    let [first, second] = [25, 8];
+    let followed = filter.stop_postures(&MotionState::default(), &[0.0], &[1.0]);
+    assert_eq!(followed.len(), first + second - 1);
+    for (k, posture) in followed.iter().enumerate() {
+        let pairs = (0..first).flat_map(|a| (0..second).map(move |b| a + b));
+        let share = pairs.filter(|sum| *sum <= k).count() as f64 / (first * second) as f64;
+        assert!((posture[0] - share).abs() < 1e-12, "{k}: {posture:?} {share}");
+    }
 }
 
 #[test]
 fn states_survive_their_rows() {
-    let filter = MotionFilter::new(vec![rates(1.0, 4.0, 100.0); 2], 0.01);
+    let filter =
+        MotionFilter::new(vec![rates(1.0, 4.0, 100.0); 2], 0.01).expect("windows of few cycles");
     let mut state = MotionState::default();
     assert_eq!(MotionState::from_rows(&state.to_rows(), 2), Some(MotionState::default()));
     filter.advance(&mut state, &[0.0, 1.0], &[0.004, 1.0]);
@@ -102,7 +135,7 @@ proptest! {
     ) {
         let (speed, acceleration, jerk) = limits;
         let allowed = rates(speed, acceleration, jerk);
-        let filter = MotionFilter::new(vec![allowed], dt_s);
+        let filter = MotionFilter::new(vec![allowed], dt_s).expect("windows of few cycles");
         let mut state = MotionState::default();
         let mut joints = vec![0.3];
         let range = [[-0.5, 0.5]];

@@ -179,7 +179,12 @@ mod tests {
         let serial = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("arm");
         let rates = joint_rates(&serial, &JointRates::new(), GivenRates::default());
         let values = vec![0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0];
-        Arm::new(serial, [0.0; 3], values, MotionFilter::new(rates, 0.02))
+        Arm::new(
+            serial,
+            [0.0; 3],
+            values,
+            MotionFilter::new(rates, 0.02).expect("windows of few cycles"),
+        )
     }
 
     #[test]

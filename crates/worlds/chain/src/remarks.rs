@@ -4,8 +4,11 @@ use super::scenario::ChainScenario;
 use super::scenario::own_overlap_text;
 use super::world::{ChainChangeKind, ChainSpec, ChainWorld};
 use sidestep_arms::kinematics::JointMotionKind;
+use sidestep_arms::motion::JointRates;
+use sidestep_import::urdf::joint_limits::GivenRates;
 use sidestep_rods::{Mobility, RodBvh};
 use sidestep_scenario::Remark;
+use std::collections::BTreeSet;
 
 /// Fraction of its highest speed below which a joint counts as led slowly: more than what is kept for rounding.
 const SLOW_FRACTION: f64 = 0.99;
@@ -22,6 +25,8 @@ pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark
     let of_files = ground.chain(files);
     let own_overlap = own_overlap_remark(&compiled.world);
     let overlaps = chains.clone().filter_map(|(k, spec)| exempt_overlaps_remark(k, spec));
+    // Otherwise all links may touch.
+    let overlaps = overlaps.filter(|_| compiled.world.rules.self_collision);
     let of_arms = unlimited.chain(led_slowly).chain(overlaps);
     of_files.chain(of_arms).chain(slow).chain(own_overlap).chain(unused_rules(compiled)).collect()
 }
@@ -115,12 +120,12 @@ fn slow_network_remark<const D: usize>(
     Some(Remark::warning("chain.network.latency_s", words))
 }
 
-/// Returns a note on joints for whose speed the model gives no limit.
+/// Returns a note on joints for whose speed nothing gives a limit.
 fn unlimited_speeds_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
     let arm = spec.arm.as_deref()?;
     let mut taken = Vec::new();
     for (joint, rates) in arm.serial.variables.iter().zip(arm.motion.rates()) {
-        if joint.max_speed.is_none() {
+        if arm.rate_sources.assumed_speeds.contains(&joint.name) {
             let unit = if joint.motion == JointMotionKind::Turn { "rad/s" } else { "m/s" };
             taken.push(format!("`{}` {:.4} {unit}", joint.name, rates.speed));
         }
@@ -154,6 +159,7 @@ fn slow_joints_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<R
     let arm = spec.arm.as_deref()?;
     let motion = &arm.motion;
     let mut slow = Vec::new();
+    let mut limiting_keys = BTreeSet::new();
     for ((joint, rates), speed) in
         arm.serial.variables.iter().zip(motion.rates()).zip(motion.reference_speeds())
     {
@@ -161,6 +167,7 @@ fn slow_joints_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<R
             let unit = if joint.motion == JointMotionKind::Turn { "rad/s" } else { "m/s" };
             let limit = rates.speed;
             slow.push(format!("`{}` at up to {speed:.4} {unit} of {limit:.4}", joint.name));
+            limiting_keys.insert(limiting_key(rates, arm.rate_sources.at_most));
         }
     }
     if slow.is_empty() {
@@ -168,11 +175,22 @@ fn slow_joints_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<R
     }
     let words = format!(
         "some joints need longer than 0.5 s to reach their highest speed, or 0.25 s to reverse their highest \
-         acceleration, and are led more slowly: {}; a higher max_acceleration or max_jerk in joint_limits makes them \
-         faster",
-        slow.join(", ")
+         acceleration, and are led more slowly: {}; a higher {} makes them faster",
+        slow.join(", "),
+        limiting_keys.into_iter().collect::<Vec<_>>().join(", or ")
     );
     Some(Remark::note(format!("chains.{k}.arm"), words))
+}
+
+/// Returns what keeps a joint from its highest speed: the key for all joints where that is as low as its own limit.
+fn limiting_key(rates: &JointRates, at_most: GivenRates) -> &'static str {
+    if at_most.acceleration == Some(rates.acceleration) {
+        return "arm.max_acceleration";
+    }
+    if at_most.jerk == Some(rates.jerk) {
+        return "arm.max_jerk";
+    }
+    "max_acceleration or max_jerk in arm.joint_limits"
 }
 
 #[cfg(test)]
@@ -283,5 +301,26 @@ mod tests {
         let [told] = &remarks(&compiled)[..] else { panic!("one remark") };
         assert_eq!(told.key, "chains.0.arm");
         assert!(told.words.contains("`j0` 3.1416 rad/s"), "{}", told.words);
+    }
+
+    #[test]
+    fn arms_are_told_of_the_limits_that_their_scenario_gives() {
+        let told = |keys: &str| {
+            let text = format!(
+                "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\n\
+                 arm = {{ urdf_text = '{}', {keys} }}\nradius_m = 0.02\n[[chains.tasks]]\nkind = \"rest\"\n",
+                planar(3)
+            );
+            let compiled =
+                ChainScenario::<3>::new(&Source::new("s.toml", text, "")).expect("valid");
+            remarks(&compiled).into_iter().map(|told| told.words).collect::<Vec<_>>()
+        };
+        assert!(told("max_velocity = 1.0").is_empty());
+        let [slow] = &told("max_velocity = 1.0, max_acceleration = 0.5")[..] else {
+            panic!("one remark")
+        };
+        assert!(slow.ends_with("a higher arm.max_acceleration makes them faster"), "{slow}");
+        let [slow] = &told("max_velocity = 1.0, max_jerk = 1.0")[..] else { panic!("one remark") };
+        assert!(slow.ends_with("a higher arm.max_jerk makes them faster"), "{slow}");
     }
 }

@@ -288,7 +288,8 @@ mod tests {
         values: &[f64],
     ) -> Vec<[f64; 2]> {
         let filter =
-            MotionFilter::new(joint_rates(chain, &JointRates::new(), GivenRates::default()), 0.02);
+            MotionFilter::new(joint_rates(chain, &JointRates::new(), GivenRates::default()), 0.02)
+                .expect("windows of few cycles");
         filter.reference_ranges(&MotionState::default(), values, follower.limits())
     }
 

@@ -3,9 +3,9 @@
 use super::{ChainScenarioCompiler, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use sidestep_arms::Arm;
 use sidestep_arms::kinematics::{ArmBody, SerialChain, Transform};
 use sidestep_arms::motion::{MotionFilter, joint_rates};
+use sidestep_arms::{Arm, RateSources};
 use sidestep_import::report::Finding;
 use sidestep_import::urdf::joint_limits::{self, GivenRates, JointRates};
 use sidestep_import::urdf::srdf::Semantics;
@@ -104,6 +104,20 @@ impl ArmSection {
             jerk: self.max_jerk.map(f64::from),
         }
     }
+
+    /// Returns where the rates of joints are from; `given` are those of a file.
+    fn rate_sources(&self, serial: &SerialChain, given: &JointRates) -> RateSources {
+        let at_most = self.highest_rates();
+        let is_in_file = |name: &str| given.get(name).is_some_and(|rates| rates.speed.is_some());
+        let mut assumed_speeds = Vec::new();
+        for variable in &serial.variables {
+            let is_given = variable.max_speed.is_some() || is_in_file(&variable.name);
+            if !is_given && at_most.speed.is_none() {
+                assumed_speeds.push(variable.name.clone());
+            }
+        }
+        RateSources { assumed_speeds, at_most }
+    }
 }
 
 impl<const D: usize> ChainScenarioCompiler<'_, D> {
@@ -153,10 +167,12 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         serial
             .check_limits("joints", &values)
             .map_err(|error| self.invalid_posture_error(at.clone(), &error))?;
-        let given = self.joint_limits(s, &serial, at)?;
+        let given = self.joint_limits(s, &serial, at.clone())?;
         let rates = joint_rates(&serial, &given, s.highest_rates());
-        let motion = MotionFilter::new(rates, self.dt_s());
-        let arm = Arm::new(serial, at_m, values, motion);
+        let rate_sources = s.rate_sources(&serial, &given);
+        let motion = MotionFilter::new(rates, self.dt_s())
+            .map_err(|error| self.source.error_from(at, &error))?;
+        let arm = Arm { rate_sources, ..Arm::new(serial, at_m, values, motion) };
         let may_touch = |links: &BTreeSet<usize>| match &semantics {
             Some(semantics) => semantics.may_touch(links),
             None => Vec::new(),

@@ -483,13 +483,9 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let points = solid.points().iter().map(|p| to_dimensions(*p)).collect();
         let mut connectors: Vec<_> = solid.connectors().iter().map(convert_arm_connector).collect();
         let mut rods = solid.rods().to_vec();
-        if let Some(tool) = &arm_section.get_ref().tool {
-            if let (Some(load), Some(radius_m)) = (connectors.last_mut(), tool.load_radius_m) {
-                load.radius_m = radius_m.into();
-            }
-            if let (Some(rod), Some(radius_m)) = (rods.last_mut(), tool.radius_m) {
-                rod.radius_m = radius_m.into();
-            }
+        // Shapes are what an arm with them consists of: its tool and its load are among them.
+        if arm.body.is_none() {
+            self.apply_tool_radii(arm_section, &mut connectors, &mut rods)?;
         }
         self.check_limits(&s.limits)?;
         for limit in &s.limits.0 {
@@ -499,6 +495,34 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let chain = Chain::new(points, connectors, rods)
             .map_err(|error| self.source.error_from(at, &error))?;
         Ok((chain, Arc::new(arm)))
+    }
+
+    /// Gives the last rod of an arm the radius of its tool, and the last connector that of its load.
+    fn apply_tool_radii(
+        &self,
+        section: &Spanned<ArmSection>,
+        connectors: &mut [Connector<D>],
+        rods: &mut [Rod],
+    ) -> Result<(), InputError> {
+        let Some(tool) = &section.get_ref().tool else { return Ok(()) };
+        let ([.., joint, tip], [.., rod]) = (connectors, rods) else { return Ok(()) };
+        let load_m = tool.load_radius_m.map_or(tip.radius_m, f64::from);
+        // A rod is at most as thick as both of its connectors. Round the end of a tool as thick as it is, a load that
+        // is thinner makes no difference.
+        let tool_m = tool.radius_m.map_or(rod.radius_m.min(load_m), f64::from);
+        if tool_m > joint.radius_m {
+            let at = self.source.key_span(section.span(), &["tool"]);
+            let limit_m = joint.radius_m;
+            let cause = format!(
+                "tool.radius_m = {tool_m} is more than the {limit_m} m of the joint before it"
+            );
+            let remedy =
+                format!("give tool.radius_m = {limit_m} or less, or the chain a higher radius_m");
+            return Err(self.source.error(at, cause, remedy));
+        }
+        rod.radius_m = tool_m;
+        tip.radius_m = load_m.max(tool_m);
+        Ok(())
     }
 
     /// Refuses an arm with a base that may move, and changes that take it apart: its joints determine the places

@@ -52,7 +52,8 @@ impl<const D: usize> TaskSection<D> {
             ("free", self.free.is_some()),
             ("tolerance_rad", self.tolerance_rad.is_some()),
             ("joints", self.joints.is_some()),
-            ("path", self.path.is_some()),
+            // Any path is that of every chain.
+            ("path", self.path == Some(PathWord::Line)),
         ]
     }
 
@@ -117,6 +118,8 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let mut given = s.tool_keys().into_iter().filter(|(_, is_given)| *is_given);
         let other = given.find(|(key, _)| others.contains(key)).map(|(key, _)| key);
         let other = other.or(s.targets_m.is_some().then_some("targets_m"));
+        // Values of joints are reached exactly.
+        let other = other.or(s.tolerance_m.is_some().then_some("tolerance_m"));
         if let Some(key) = other {
             let at = self.source.key_span(at, &[key]);
             let cause = format!("`{key}` beside `joints`, which are whole targets");
@@ -157,8 +160,11 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let along = is_free([FreeAxis::X, FreeAxis::Y, FreeAxis::Z]);
         let about = is_free([FreeAxis::Rx, FreeAxis::Ry, FreeAxis::Rz]);
         let is_line = s.path == Some(PathWord::Line);
-        if !is_turned && !is_line {
-            let key = if s.free.is_some() { "free" } else { "tolerance_rad" };
+        // A free coordinate is refused as one of the line.
+        let frees_turn = s.free.is_some() && (!is_line || about.contains(&true));
+        let of_turns = [("free", frees_turn), ("tolerance_rad", s.tolerance_rad.is_some())];
+        let unused = of_turns.into_iter().find(|(_, is_given)| *is_given);
+        if !is_turned && let Some((key, _)) = unused {
             let at = self.source.key_span(at, &[key]);
             let remedy = "add rpy_rad or quaternions, or leave this out";
             return Err(self.source.error(at, "no orientation is asked for", remedy));

@@ -40,6 +40,40 @@ fn an_arm_without_a_joint_that_moves_is_refused() {
 }
 
 #[test]
+fn a_tool_is_as_thick_as_it_is_said_or_refused_by_name() {
+    let radii_m = |tool: &str| {
+        let text =
+            format!("format = 1\nworld = \"chain\"\n{}", arm(&format!("tool = {{ {tool} }}")));
+        let compiled = ChainScenario::<3>::new(&Source::new("s.toml", text, "")).expect("valid");
+        let chain = &compiled.world.chains[0].start;
+        let tip = chain.connectors().last().expect("a tip").radius_m;
+        [chain.rods().last().expect("a rod").radius_m, tip]
+    };
+    // Connectors of 0.02 m, and rods of 0.016 m.
+    assert_eq!(radii_m("load_radius_m = 0.01"), [0.01, 0.01]);
+    assert_eq!(radii_m("load_radius_m = 0.05"), [0.016, 0.05]);
+    assert_eq!(radii_m("radius_m = 0.018, load_radius_m = 0.01"), [0.018, 0.018]);
+    assert_refused(
+        &arm("tool = { radius_m = 0.06 }"),
+        &["tool.radius_m = 0.06 is more than the 0.02 m", "give tool.radius_m = 0.02 or less"],
+    );
+}
+
+#[test]
+fn any_path_is_that_of_every_chain() {
+    let task = "kind = \"targets\"\nconnector = 2\ntargets_m = [[1.0, 0.5]]\npath =";
+    let chain = "[[chains]]\nconnectors = 4\nrod_m = 0.4\n[[chains.tasks]]\n";
+    assert_valid(&format!("{chain}{task} \"any\"\n"));
+    assert_refused(&format!("{chain}{task} \"line\"\n"), &["only the tool of an arm has"]);
+}
+
+#[test]
+fn a_cycle_too_short_for_the_joints_of_an_arm_is_refused() {
+    let text = arm("").replace("dimensions = 3", "dimensions = 3\ndt_s = 1e-8");
+    assert_refused(&text, &["more than 4096 cycles", "give chain.dt_s = "]);
+}
+
+#[test]
 fn numbers_of_a_navigator_are_numbers_and_in_order() {
     let navigator = |keys: &str| {
         format!(
