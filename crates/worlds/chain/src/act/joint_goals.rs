@@ -37,8 +37,8 @@ pub(super) fn step_to_joint_goal<const D: usize>(
         return DesiredMove::Rest;
     }
     if body.plan.is_some() {
-        // As long as there is a path the initiator does not give up, though it may lead away from the target first.
-        body.driving.late = 0;
+        // As long as there is a path no time is lost, though it may lead away from the target first. The time that was
+        // lost before still counts: of a path that is dropped again and again the initiator gives up.
         return DesiredMove::Follow;
     }
     let late = body.driving.late;

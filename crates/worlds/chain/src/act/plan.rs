@@ -140,8 +140,7 @@ fn follow_chain_path<const D: usize>(
     let from = space.present_posture();
     let to = path.front()?;
     let limits = StepLimits::from_initiator(initiator);
-    let segment = PathSegment { space: &space, from: &from, to };
-    let (next, is_there) = limits.next_posture(&segment, 1.0, ChainPosture::clone);
+    let (next, is_there) = limits.next_posture(&space, &from, to);
     if !space.is_path_free(&from, &next) || !move_along(initiator, body, &from, &next) {
         return None;
     }
@@ -287,7 +286,11 @@ fn move_along<const D: usize>(
     let agent = initiator.task.agent;
     chain.points_mut().copy_from_slice(next);
     let ChainContext { world, obstacles, .. } = initiator.context;
+    // The rods of an arm with shapes are guides, which may pass each other: its shapes were checked.
+    let arm = initiator.context.spec.arm.as_deref();
+    let has_solid_rods = arm.is_none_or(|arm| arm.body.is_none());
     let meets_itself = world.rules.self_collision
+        && has_solid_rods
         && find_own_passage(chain, from, &mut RodBvh::default()).is_some();
     if meets_itself || find_tunneling(chain, from, obstacles, 0.0).is_some() {
         chain.points_mut().copy_from_slice(from);
@@ -307,13 +310,6 @@ struct StepLimits {
     joint: f64,
 }
 
-/// A straight piece of a planned path.
-struct PathSegment<'a, S: ConfigurationSpace> {
-    space: &'a S,
-    from: &'a S::Posture,
-    to: &'a S::Posture,
-}
-
 impl StepLimits {
     fn from_initiator<const D: usize>(initiator: Initiator<'_, D>) -> Self {
         let joint = initiator.context.world.rules.joint_step_max_m;
@@ -328,26 +324,23 @@ impl StepLimits {
         Self { joint: escape_m.map_or(limits.joint, |most_m| limits.joint.min(most_m)), ..limits }
     }
 
-    /// Returns the posture between two that is reached in one cycle, at most a `fraction` of the motion, and whether
-    /// it is the second one. `positions` returns where the connectors of a posture are.
-    fn next_posture<const D: usize, S: ConfigurationSpace>(
+    /// Returns the posture between two that is reached in one cycle, and whether it is the second one.
+    fn next_posture<const D: usize>(
         &self,
-        segment: &PathSegment<'_, S>,
-        mut fraction: f64,
-        positions: impl Fn(&S::Posture) -> ChainPosture<D>,
-    ) -> (S::Posture, bool) {
-        let PathSegment { space, from, to } = *segment;
-        let start = positions(from);
-        let mut next = space.interpolate(from, to, fraction);
+        space: &ChainConfigurationSpace<'_, D>,
+        from: &ChainPosture<D>,
+        to: &ChainPosture<D>,
+    ) -> (ChainPosture<D>, bool) {
+        let mut fraction = 1.0;
+        let mut next = to.clone();
         while fraction >= MIN_FRACTION {
-            let points = positions(&next);
-            let moves_m = start.iter().zip(&points).map(|(a, b)| distance(*a, *b));
-            let led = distance(start[self.agent], points[self.agent]) / self.led;
+            let moves_m = from.iter().zip(&next).map(|(a, b)| distance(*a, *b));
+            let led = distance(from[self.agent], next[self.agent]) / self.led;
             let excess = led.max(moves_m.fold(0.0, f64::max) / self.joint);
             if excess <= 1.0 {
                 break;
             }
-            // Connectors of an arm do not move in proportion, so that it may take several rounds.
+            // Connectors of a chain turn about others, and do not move in proportion: it may take several rounds.
             fraction *= STEP_LIMIT_FRACTION / excess;
             next = space.interpolate(from, to, fraction);
         }

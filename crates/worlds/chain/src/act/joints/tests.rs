@@ -275,6 +275,18 @@ fn what_only_a_tool_can_do_is_refused_elsewhere_with_a_remedy() {
             "stay between -2.094 and 2.094 rad",
         ),
         ("kind = \"rest\"\nconnector = 3\npath = \"line\"".into(), "leave"),
+        (
+            format!("{goes}\nconnector = 3\npath = \"line\"\nfree = [\"rz\"]"),
+            "add rpy_rad or quaternions",
+        ),
+        (
+            format!("{goes}\nconnector = 3\npath = \"line\"\ntolerance_rad = 0.1"),
+            "add rpy_rad or quaternions",
+        ),
+        (
+            "kind = \"targets\"\nconnector = 3\njoints = [[0, 0, 0, 1, 0, 0.5, 0]]\ntolerance_m = 0.1".into(),
+            "leave one of them out",
+        ),
     ] {
         let (cause, remedy) = cause(&task);
         assert!(remedy.contains(words), "{task}: {cause}; {remedy}");
@@ -350,6 +362,24 @@ fn the_links_of_an_arm_are_what_must_not_touch() {
     );
     let source = Source::new("s.toml", &text, root());
     assert!(ChainScenario::<3>::new(&source).is_err());
+}
+
+/// Links one above another, whose rods are in one plane.
+#[test]
+fn links_that_pass_over_each_other_follow_their_plan() {
+    let stacked = boxed()
+        .replace("<origin xyz='0.4 0 0'/>", "<origin xyz='0.4 0 0.3'/>")
+        .replace("<origin xyz='0.3 0 0'/>", "<origin xyz='0.6 0 0'/>");
+    let text = format!(
+        "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\n\
+         arm = {{ urdf_text = \"\"\"{stacked}\"\"\", joints = [0.0, 2.2, 0.5] }}\nradius_m = 0.02\nrod_radius_m = 0.01\n\
+         [[chains.tasks]]\nkind = \"targets\"\nconnector = 3\njoints = [[0.0, 2.2, 2.2]]\nspeed_m_s = 0.3"
+    );
+    let source = Source::new("s.toml", &text, root());
+    let mut run = ChainScenario::<3>::new(&source).expect("valid").start(&source, 1);
+    assert_joints_keep_their_laws(&mut run, 5000, "stacked");
+    assert_all_is_reached(&run, "stacked");
+    assert_eq!(run.state().body(0).tally.rungs.planned, 1);
 }
 
 #[test]
