@@ -15,7 +15,8 @@ const TABLE: &str = "joints";
 pub struct ArmTrajectory {
     /// The number of its chain.
     pub chain: u32,
-    /// The name of its chain, or `chain_` and its number, with another number behind where a chain has that name; names of ROS: letters, digits and `_`.
+    /// The name of its chain, or `chain_` and its number, with another number behind where a chain has that
+    /// name; names of ROS: letters, digits and `_`.
     pub name: String,
     /// The names of its joints, from base to tip.
     pub joints: Vec<String>,

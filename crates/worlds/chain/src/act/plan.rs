@@ -275,7 +275,8 @@ impl<const D: usize> JointStep<'_, D> {
     }
 }
 
-/// Moves the chain to the next posture of a planned path, unless it would tunnel through something or pass through itself.
+/// Moves the chain to the next posture of a planned path, unless it would tunnel through something or pass through
+/// itself.
 fn move_along<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut ChainBodyState<D>,
