@@ -227,24 +227,17 @@ impl<'a, const D: usize> MotionContext<'a, D> {
         });
         if self.rules.self_collision {
             self.own_rods.visit(near, |other| {
-                for block in self.own_blocking_parts(other, moving).into_iter().flatten() {
-                    visit_one(&block);
+                // Each rod stands for the connector at its lower end, so that none is visited twice; the last one for both.
+                let is_last = other + 2 == self.chain.connectors().len();
+                let upper = is_last.then_some(ChainPart::Connector(other + 1));
+                let parts = [Some(ChainPart::Rod(other)), Some(ChainPart::Connector(other)), upper];
+                for part in parts.into_iter().flatten() {
+                    if let Some(block) = self.own_blocking_part(part, moving) {
+                        visit_one(&block);
+                    }
                 }
             });
         }
-    }
-
-    /// Returns a rod of the chain and its connectors (the last rod's both) as obstacles to a moving part.
-    fn own_blocking_parts(
-        &self,
-        other: usize,
-        moving: &MovingPart,
-    ) -> [Option<BlockingPart<D>>; 3] {
-        // Each rod stands for the connector at its lower end, so that none is visited twice.
-        let is_last = other + 2 == self.chain.connectors().len();
-        let upper = is_last.then_some(ChainPart::Connector(other + 1));
-        let parts = [Some(ChainPart::Rod(other)), Some(ChainPart::Connector(other)), upper];
-        parts.map(|part| part.and_then(|part| self.own_blocking_part(part, moving)))
     }
 
     /// Returns a part of the chain as an obstacle to a moving one; none if it is in the way of neither its rod nor its
