@@ -1,6 +1,6 @@
 //! Candidate positions of a slave whose master has moved: push, pull, resize, rotate (slides A1 to A8).
 
-use super::chain::{Mobility, Rod};
+use super::chain::{Mobility, Rod, SKIN_M};
 use super::geometry::{
     ConvexCore, Cuboid, Point, add, add_scaled, angle_between_rad, convert_dimensions, distance,
     dot, lerp, norm, normalized, scaled, sub, unit_x,
@@ -10,8 +10,7 @@ use super::interval::{
     block_rod, min_turn_to_free_rad,
 };
 use super::motion_context::{
-    BlockingPart, BlockingPartOwner, IncompleteVeto, MotionContext, SKIN_M, SlaveStep,
-    is_length_allowed,
+    BlockingPart, BlockingPartOwner, IncompleteVeto, MotionContext, SlaveStep, is_length_allowed,
 };
 use super::obstacle::bounds_around;
 use super::reaction::{MasterMove, Reaction};

@@ -11,6 +11,9 @@ use std::f64::consts::{PI, SQRT_2};
 /// Tolerance of the rods' lengths, meters. One motion keeps lengths to about 1e-14 m, so a tolerance far above rounding
 /// refuses no motion, and errors of many motions do not add up because each one sets the length anew.
 pub const LENGTH_TOLERANCE_M: f64 = 1e-9;
+/// Clearance that a turn aims at, meters. It is a hundred times the tolerance: a master that touches a wall blocks a
+/// half-plane of directions, and with equal values it counts as inside the wall in the next step, which is a veto.
+pub const SKIN_M: f64 = 1e-7;
 
 /// Largest coordinate: farther from the origin, rounding is no longer small against the tolerances.
 pub const MAX_COORDINATE_M: f64 = 1e6;

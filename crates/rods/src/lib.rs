@@ -36,11 +36,11 @@ mod veto;
 pub mod wavefront;
 
 pub use chain::{
-    Chain, Connector, LENGTH_TOLERANCE_M, MAX_COORDINATE_M, Mobility, Rod, is_in_range,
+    Chain, Connector, LENGTH_TOLERANCE_M, MAX_COORDINATE_M, Mobility, Rod, SKIN_M, is_in_range,
 };
 pub use grid::SpatialGrid;
 pub use motion_context::{
-    BEND_TOLERANCE_RAD, IncompleteVeto, SKIN_M, TOLERANCE_M, contact_distance_m, is_length_allowed,
+    BEND_TOLERANCE_RAD, IncompleteVeto, TOLERANCE_M, contact_distance_m, is_length_allowed,
 };
 pub use obstacle::{Obstacle, Obstacles, bounds_around, outline_walls};
 pub use own_body::{

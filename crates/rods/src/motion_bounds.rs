@@ -71,19 +71,22 @@ impl<const D: usize> GapBudget<D> {
         self.built_at_m = f64::NEG_INFINITY;
     }
 
-    /// Visits the elements within `search_m` of a box, and perhaps some others.
-    fn visit_near(
-        &mut self,
-        near: &Aabb<D>,
-        search_m: f64,
-        odometer_m: f64,
-        bounds: impl Iterator<Item = Aabb<D>>,
-        visit_one: impl FnMut(usize),
-    ) {
+    /// Brings the boxes up to date, unless they are right enough to look for elements within `search_m`.
+    fn refresh(&mut self, search_m: f64, odometer_m: f64, bounds: impl Iterator<Item = Aabb<D>>) {
         if odometer_m - self.built_at_m > STALE_FRACTION * search_m {
             self.tree.rebuild(bounds);
             self.built_at_m = odometer_m;
         }
+    }
+
+    /// Visits the elements within `search_m` of a box, and perhaps some others.
+    fn visit_near(
+        &self,
+        near: &Aabb<D>,
+        search_m: f64,
+        odometer_m: f64,
+        visit_one: impl FnMut(usize),
+    ) {
         self.tree.visit(&near.grown(search_m + odometer_m - self.built_at_m), visit_one);
     }
 }
@@ -289,7 +292,8 @@ impl<const D: usize> SeparationBounds<D> {
         let bounds = points.windows(2).map(Aabb::from_points);
         let rods = chain.rods().len();
         let mut gap_m = search_m;
-        self.rods.visit_near(&near, search_m + thickness_m, self.odometer_m, bounds, |other| {
+        self.rods.refresh(search_m + thickness_m, self.odometer_m, bounds);
+        self.rods.visit_near(&near, search_m + thickness_m, self.odometer_m, |other| {
             if other == rod || are_rods_surely_apart(ends(rod), ends(other), gap_m + thickness_m) {
                 return;
             }
@@ -329,7 +333,8 @@ impl<const D: usize> SeparationBounds<D> {
         let own = bounds_of(block);
         let bounds = (0..rods.div_ceil(BLOCK)).map(bounds_of);
         let mut gap_m = search_m;
-        self.blocks.visit_near(&own, search_m + thickness_m, self.odometer_m, bounds, |other| {
+        self.blocks.refresh(search_m + thickness_m, self.odometer_m, bounds);
+        self.blocks.visit_near(&own, search_m + thickness_m, self.odometer_m, |other| {
             if other.abs_diff(block) > 1 {
                 gap_m = gap_m.min(own.distance_m(&bounds_of(other)) - thickness_m);
             }

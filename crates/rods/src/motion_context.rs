@@ -15,9 +15,6 @@ use super::veto::VetoReason;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Clearance that a turn aims at, meters. It is a hundred times the tolerance: a master that touches a wall blocks a
-/// half-plane of directions, and with equal values it counts as inside the wall in the next step, which is a veto.
-pub const SKIN_M: f64 = 1e-7;
 /// Penetration that counts as contact, meters: distances of segments are exact to about 1e-15 m of their coordinates,
 /// so rounding is no contact.
 pub const TOLERANCE_M: f64 = 1e-9;

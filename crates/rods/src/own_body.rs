@@ -8,9 +8,8 @@
 //! - Any other two parts keep the sum of their radii. If the rods between them can be shorter than that, the two
 //!   meet even where the chain is straight; then they keep the distance that they have there.
 
-use super::chain::Chain;
+use super::chain::{Chain, SKIN_M};
 use super::geometry::{Aabb, Point, between_segments, distance};
-use super::motion_context::SKIN_M;
 use super::rod_bvh::RodBvh;
 use super::sweep::{RodPairSweep, RodSweep};
 use std::fmt::{self, Display, Formatter};

@@ -5,12 +5,11 @@
 //! If it is not, rings of directions around the wanted one are tried from the narrowest on, and the
 //! first free direction is brought as near to the wanted one as it stays free.
 
+use super::chain::SKIN_M;
 use super::geometry::{
     Point, add, add_scaled, angle_between_rad, dot, norm, normalized, perpendicular, scaled, sub,
 };
-use super::motion_context::{
-    BlockingPart, BlockingPartOwner, SKIN_M, SlaveStep, contact_distance_m,
-};
+use super::motion_context::{BlockingPart, BlockingPartOwner, SlaveStep, contact_distance_m};
 use sidestep_kernel::math;
 use std::f64::consts::{PI, TAU};
 

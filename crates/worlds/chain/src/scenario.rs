@@ -15,6 +15,7 @@ mod starts;
 mod tasks;
 #[cfg(test)]
 mod tests;
+mod tool_keys;
 
 use super::deploy::deployment::Deployment;
 use super::ground::{GroundMap, MovingObstacles};

@@ -128,8 +128,8 @@ fn no_part_is_thrown_about_where_a_rod_turns_aside() {
     let (usual_m_s, progress) = fastest_m_s(SEVERAL);
     // Steps of 2 cm at most, of 5 cm in a cycle, each with slaves up to four times as far.
     assert!(usual_m_s <= 3.0 * 0.08 / 0.05 + 1e-9, "{usual_m_s} m/s for leaders at 1 m/s");
-    // Of a run of 2,000 cycles, these are three tenths.
-    assert!(progress > 0.28, "{progress}");
+    // Of a run of 2,000 cycles, these are three tenths; chains whose own body is in their way wait a little.
+    assert!(progress > 0.26, "{progress}");
     let text = SEVERAL.replace("dt_s = 0.05", "dt_s = 0.05\nslave_step_max_m = inf");
     assert!(fastest_m_s(&text).0 > usual_m_s, "there is a limit to keep to");
 }

@@ -63,14 +63,15 @@ fn a_chain_that_follows_several_motions_at_once_has_the_same_bits_however_it_is_
 }
 
 /// With a limit of sub-steps, though it has no effect, every motion is made by itself; with a pebble
-/// far away every part is looked at. All results are the same.
+/// far away every part is looked at, in sub-steps, which are the same with a limit of them. All results are the same.
 #[test]
 fn what_is_put_off_or_proven_is_what_single_motions_do() {
     let single = OPEN.replace("[chain]", "[chain]\nstep_m = 1.0");
-    let pebble = format!("{COILED}\n[[obstacles]]\nat_m = [900.0, 900.0]\nradius_m = 0.1\n");
+    let coiled = COILED.replace("[chain]", "[chain]\nstep_m = 0.005");
+    let pebble = format!("{coiled}\n[[obstacles]]\nat_m = [900.0, 900.0]\nradius_m = 0.1\n");
     for seed in 0..6 {
         assert_same_end::<3>(seed, OPEN, &single, 300);
-        assert_same_end::<2>(seed, COILED, &pebble, 200);
+        assert_same_end::<2>(seed, &coiled, &pebble, 200);
     }
 }
 

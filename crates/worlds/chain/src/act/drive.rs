@@ -1,10 +1,11 @@
 //! One cycle of a chain's present task: the move that its driver wants, and its outcome.
 
-use super::desired_move::{DesiredMove, InitiatorContext, desired_move};
+use super::desired_move::DesiredMove;
 use super::initiator::{move_initiator, wait_for_escape};
 use super::lookahead;
 use super::orders::{StepOptions, execute_ordered_motion};
 use super::plan::{follow_plan, next_waypoint};
+use super::task_moves::{InitiatorContext, desired_move};
 use super::tasks::{start_next_task, task_end_event};
 use super::wheels::{drive_on_wheels, turn_robot};
 use super::{ChainContext, ChainCycleState, Initiator};

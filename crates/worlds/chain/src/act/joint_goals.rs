@@ -1,11 +1,11 @@
 //! Targets of an arm that are more than the place of a connector: poses of its tool, straight lines, and joint values.
 //! Local rules know places alone, so these are always planned.
 
+use super::desired_move::DesiredMove;
 use super::joint_motion::has_come_to_rest;
 use super::plan::is_plan_due;
 use super::tasks::{complete_target, give_up_if_stuck, is_last_target};
 use super::{ChainCycleState, Initiator};
-use crate::act::desired_move::DesiredMove;
 use crate::driver::{TargetPath, Targets};
 use crate::events::EventKind;
 use crate::state::{ChainBodyState, MotionPlan};

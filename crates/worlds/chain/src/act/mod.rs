@@ -11,7 +11,7 @@
 //! ```text
 //! broken.rs, gather.rs -> bounds.rs (escape) -> drive.rs -> bounds.rs (back into the claim) -> orders.rs
 //!                      -> joint_motion.rs -> follow.rs -> measure.rs
-//! drive.rs     -> desired_move.rs -> wheels.rs, plan.rs, orders.rs   what the initiator wants
+//! drive.rs     -> task_moves.rs -> wheels.rs, plan.rs, orders.rs   what the initiator wants
 //!              -> joint_goals.rs -> plan.rs                          ... of an arm's tool and joints
 //!              -> own_driver.rs                                      ... by a driver of the program's own
 //!              -> lookahead.rs                                       whether it rests instead
@@ -40,6 +40,7 @@ mod outcome;
 mod own_driver;
 mod plan;
 mod situation;
+mod task_moves;
 mod tasks;
 #[cfg(test)]
 mod tests;
@@ -52,13 +53,13 @@ use super::scratch::PositionBuffer;
 use super::state::ChainBodyState;
 use super::world::{ChainSpec, ChainWorld};
 use bounds::EscapeContext;
-use desired_move::{CycleInputs, InitiatorContext};
 use event_sink::EventSink;
 use negotiation::Negotiation;
 use sidestep_kernel::stream::{Draws, Purpose};
 use sidestep_kernel::{Cycle, EntitySlot, PhaseContext};
 use sidestep_rods::geometry::{Aabb, Point, distance};
 use sidestep_rods::{Obstacles, Propagator, Veto};
+use task_moves::{CycleInputs, InitiatorContext};
 
 /// The circumstances in which a chain acts, constant during the cycle.
 #[derive(Clone, Copy)]

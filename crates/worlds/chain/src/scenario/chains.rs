@@ -242,7 +242,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         arm: Option<&Arm>,
     ) -> Result<Vec<Task<D>>, InputError> {
         let s = section.get_ref();
-        let tasks = s.tasks.0.iter().map(|task| self.task(task, s, start, arm));
+        let tasks = s.tasks.0.iter().map(|task| self.task(task, s.robots.is_some(), start, arm));
         let tasks = tasks.collect::<Result<Vec<_>, _>>()?;
         for (section, task) in s.tasks.0.iter().zip(&tasks) {
             self.check_leader(s, section, task, start)?;

@@ -3,8 +3,7 @@
 use super::super::driver::{TargetPath, Targets};
 use super::ChainScenarioCompiler;
 use super::tasks::TaskSection;
-use schemars::JsonSchema;
-use serde::Deserialize;
+use super::tool_keys::{FreeAxis, PathWord, ToolContext};
 use sidestep_arms::Arm;
 use sidestep_arms::kinematics::{ArmGoal, PoseMask, Transform};
 use sidestep_arms::plan::JointGoal;
@@ -14,34 +13,6 @@ use std::ops::Range;
 
 /// Angle at which an orientation counts as reached, unless it is given, rad: that of 1 mm at the end of a tool of 1 m.
 const DEFAULT_TOLERANCE_RAD: f64 = 1e-3;
-
-/// A part of a pose that does not count, in the axes of the target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum FreeAxis {
-    /// The position along x.
-    X,
-    /// The position along y.
-    Y,
-    /// The position along z.
-    Z,
-    /// The turn about x.
-    Rx,
-    /// The turn about y.
-    Ry,
-    /// The turn about z.
-    Rz,
-}
-
-/// The way from one target to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum PathWord {
-    /// Any: by local rules and plans.
-    Any,
-    /// A straight line of the tool.
-    Line,
-}
 
 impl<const D: usize> TaskSection<D> {
     /// Returns the keys that an arm's tool alone may have, and whether they are given.
@@ -64,14 +35,6 @@ impl<const D: usize> TaskSection<D> {
             || self.joints.is_some()
             || self.path == Some(PathWord::Line)
     }
-}
-
-/// The tool of an arm whose targets are compiled.
-#[derive(Clone, Copy)]
-pub(super) struct ToolContext<'a> {
-    pub(super) arm: Option<&'a Arm>,
-    /// The connector that leads.
-    pub(super) connector: usize,
 }
 
 impl<const D: usize> ChainScenarioCompiler<'_, D> {

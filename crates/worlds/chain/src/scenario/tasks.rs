@@ -4,9 +4,9 @@ use super::super::deploy::deployment::Deployment;
 use super::super::driver::own_driver::OwnDriver;
 use super::super::driver::{MAX_MOTIONS, Targets, Task, TaskKind, Wander};
 use super::super::script::{Script, ScriptMotion, Turtle};
-use super::chains::ChainSection;
-use super::joint_goals::{FreeAxis, PathWord, ToolContext};
+
 use super::navigators::NavigatorSection;
+use super::tool_keys::{FreeAxis, PathWord, ToolContext};
 use super::{BoxSection, ChainScenarioCompiler, MAX_VALUE, PointValue, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -141,14 +141,14 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     pub(super) fn task(
         &self,
         section: &Spanned<TaskSection<D>>,
-        section_of_chain: &ChainSection<D>,
+        is_swarm: bool,
         chain: &Chain<D>,
         arm: Option<&Arm>,
     ) -> Result<Task<D>, InputError> {
         let s = section.get_ref();
         let at = section.span();
         let n = chain.points().len();
-        let plans = s.has_planner(self.plans_usually(section_of_chain, chain));
+        let plans = s.has_planner(self.plans_usually(is_swarm, chain));
         if plans {
             self.check_planner(section, chain)?;
         }
@@ -185,12 +185,12 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// Returns whether tasks of a chain plan paths unless they say otherwise: with a fixed base always, and otherwise
     /// where its own body can be in its way and plans are cheap and stay right, because the chain is short, held at
     /// one connector at most, moved as a whole, and nothing moves around it.
-    fn plans_usually(&self, section: &ChainSection<D>, chain: &Chain<D>) -> bool {
+    fn plans_usually(&self, is_swarm: bool, chain: &Chain<D>) -> bool {
         let held = chain.connectors().iter().filter(|c| c.mobility != Mobility::Free).count();
         let has_base = chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed);
         let is_alone = self.file.chain.deployment == Deployment::Direct
             && self.file.chain.self_collision != Some(false)
-            && section.robots.is_none()
+            && !is_swarm
             && !self.has_movers()
             && self.file.chains.0.iter().map(|section| section.get_ref().count).sum::<usize>() == 1;
         // A single connector has no posture to plan.
