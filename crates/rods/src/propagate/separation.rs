@@ -60,10 +60,12 @@ impl<const D: usize> Propagator<D> {
         let Some(tally) = self.pull_and_prove(chain, driven, StayRule::Nearly) else {
             return false;
         };
+        let run = tally.from..tally.to;
         // A later sub-step may end in a veto, which takes back the whole request.
         if !is_last {
-            self.save_positions(driven.first, tally.from..tally.to);
+            self.save_positions(driven.first, run.clone());
         }
+        self.motion_bounds.accept(chain, run);
         self.tally.add(&tally);
         true
     }
@@ -82,13 +84,14 @@ impl<const D: usize> Propagator<D> {
         }
         let tally = self.pull_and_prove(chain, driven, StayRule::Exactly);
         if let Some(tally) = &tally {
+            self.motion_bounds.accept(chain, tally.from..tally.to);
             self.tally.add(tally);
         }
         tally.is_some()
     }
 
     /// Moves the chain as in the open; the tally of it, or none if the motion is not proven to be allowed and was taken
-    /// back.
+    /// back. The caller accepts it, which forgets the positions before.
     fn pull_and_prove(
         &mut self,
         chain: &mut Chain<D>,
@@ -115,9 +118,7 @@ impl<const D: usize> Propagator<D> {
         let motion = ProvenMotion { moved: run.clone(), travel_m, in_turn: false };
         let holds = tally.max_slave_step_m <= self.rules.slave_step_max_m
             && self.motion_bounds.allows(chain, &motion);
-        if holds {
-            self.motion_bounds.accept(chain, run);
-        } else {
+        if !holds {
             chain.points_mut()[run.clone()]
                 .copy_from_slice(&self.motion_bounds.recorded_points()[run]);
             self.motion_bounds.revert(travel_m);

@@ -123,3 +123,36 @@ fn alone_a_chain_moves_the_same_whatever_was_moved_before() {
 fn many_more_chains_in_their_own_way_move_the_same() {
     lead_many(20..150);
 }
+
+/// What earlier sub-steps have moved is taken back, whether they were proven or tested.
+#[test]
+fn a_vetoed_request_of_a_coiled_chain_leaves_every_bit() {
+    let rod = Rod { min_m: 0.2, max_m: 0.3, radius_m: 0.064 };
+    let rules =
+        ReactionRules { self_collision: true, step_m: Some(0.005), ..ReactionRules::default() };
+    let mut vetoes = 0;
+    for seed in 0..40 {
+        let mut chain =
+            Chain::straight([0.0, 0.0], [1.0, 0.0], 39, rod, Connector::free(0.08)).unwrap();
+        let mut propagator = Propagator::new(rules.clone());
+        let mut walk = Wanderer::new(seed);
+        for _ in 0..400 {
+            let before = bits(&chain);
+            let at = chain.points()[0];
+            let to = walk.next(at, 0.025);
+            let is_within = to.iter().all(|x| x.abs() < 1.5);
+            let mode = VetoEffect::Exact;
+            let request = MotionRequest { mode, ..MotionRequest::from_operator(0, to) };
+            let obstacles = Obstacles::default();
+            let outcome = propagator.propagate(&mut chain, &obstacles, &request).unwrap();
+            if outcome.veto().is_some() {
+                assert_eq!(bits(&chain), before, "{seed}");
+                vetoes += 1;
+            }
+            if outcome.veto().is_some() || !is_within {
+                walk.turn_anywhere();
+            }
+        }
+    }
+    assert!(vetoes > 20, "{vetoes}");
+}
