@@ -134,7 +134,7 @@ fn a_vetoed_request_of_a_coiled_chain_leaves_every_bit() {
     for seed in 0..40 {
         let mut chain =
             Chain::straight([0.0, 0.0], [1.0, 0.0], 39, rod, Connector::free(0.08)).unwrap();
-        let mut propagator = Propagator::new(rules.clone());
+        let mut propagator = Propagator::new(rules);
         let mut walk = Wanderer::new(seed);
         for _ in 0..400 {
             let before = bits(&chain);

@@ -431,7 +431,7 @@ impl<'a> ShieldSearch<'a> {
             // Those that change nothing are asked first: mostly the question ends with one of them.
             let is_settled = |j: &usize| self.plans[*j].is_settled();
             let in_the_way = |j: &usize| !self.is_compatible(i, &plan, *j);
-            if self.near[i].iter().filter(|j| is_settled(j)).any(|j| in_the_way(j)) {
+            if self.near[i].iter().filter(|j| is_settled(j)).any(&in_the_way) {
                 return None;
             }
             let mut changes: PlanChanges = [(i, plan.clone())].into();

@@ -9,17 +9,16 @@ use super::orders::motion_from_orders;
 use super::own_driver::ask_own_driver;
 use super::plan::plan_if_stuck;
 use super::tasks::{complete_target, is_last_target};
-use super::wheels::{NavigatedChain, WheelStep};
+use super::wheels::NavigatedChain;
 use super::{ChainCycleState, ChainFollowMode, Initiator};
 use crate::driver::external::Orders;
 use crate::driver::own_driver::DriverAction;
-use crate::driver::step_motion::StepMotion;
 use crate::driver::{Targets, TaskKind, Wander, wander_direction};
 use crate::script::ScriptMotion;
 use crate::state::ChainBodyState;
 use crate::swarm::leader::LeaderDecision;
 use crate::world::purpose;
-use sidestep_rods::geometry::{Point, add_scaled, convert_dimensions, distance, move_toward};
+use sidestep_rods::geometry::{add_scaled, convert_dimensions, distance, move_toward};
 
 /// Fraction of a cycle's step by which an initiator has to come nearer to its target for that to count: a chain that
 /// slides along itself by a hair in each cycle does not get there.
