@@ -26,6 +26,7 @@ __all__ = [
     "Table",
     "Team",
     "__version__",
+    "arm_trajectories",
     "compare_methods",
     "inspect",
     "learn_effector",
@@ -324,6 +325,7 @@ class Arm:
     def inverse(self, targets: _Reals, start: _Reals, options: Mapping[str, Any]) -> IkResult: ...
 
 def arm_trajectories(folder: str | PathLike[str], every: int) -> list[ArmTrajectory]: ...
+
 @final
 class Learned:
     @property
