@@ -155,38 +155,36 @@ fn straight() {
 fn pull_straight(n: usize, rod_m: f64, motions: usize, self_collision: bool) -> f64 {
     let rod = Rod::with_fixed_length(rod_m, 0.008);
     let back = scaled(unit_x(), -1.0);
-    let mut chain =
-        Chain::straight([0.0; 3], back, n - 1, rod, Connector::free(0.02)).expect("right");
-    let mut propagator = Propagator::default();
-    propagator.rules.self_collision = self_collision;
-    let mut k = 0;
-    let s = best_s(7, || {
-        for _ in 0..motions {
-            k += 1;
-            let ahead_m = 0.01 * f64::from(k);
-            let to = [ahead_m, 0.05 * sin(ahead_m), 0.05 * (1.0 - cos(ahead_m))];
-            let request = MotionRequest::from_operator(0, to);
-            let nothing = Obstacles::default();
-            let outcome = propagator.propagate(&mut chain, &nothing, &request).expect("right");
-            assert!(outcome.motion().is_some(), "nothing is in the way");
-        }
-    });
-    1e6 * s / motions as f64
+    let chain = Chain::straight([0.0; 3], back, n - 1, rod, Connector::free(0.02)).expect("right");
+    pull_head(chain, &Obstacles::default(), motions, self_collision, |k| {
+        let ahead_m = 0.01 * k as f64;
+        [ahead_m, 0.05 * sin(ahead_m), 0.05 * (1.0 - cos(ahead_m))]
+    })
 }
 
-/// Microseconds per motion.
+/// Microseconds per motion of a snake, alone or with a ball far away.
 fn pull_beside(n: usize, motions: usize, self_collision: bool, far: bool) -> f64 {
     let balls = if far { vec![Obstacle::ball(1, [0.0, 0.0, 1e4], 0.5)] } else { Vec::new() };
     let obstacles = Obstacles::new(balls, 0.15).expect("right");
-    let mut chain = snake(n);
+    pull_head(snake(n), &obstacles, motions, self_collision, head)
+}
+
+/// Microseconds per motion of a chain whose head is led to `to(number of the motion)`, where nothing is in the way.
+fn pull_head(
+    mut chain: Chain<3>,
+    obstacles: &Obstacles<3>,
+    motions: usize,
+    self_collision: bool,
+    to: impl Fn(usize) -> Point<3>,
+) -> f64 {
     let mut propagator = Propagator::default();
     propagator.rules.self_collision = self_collision;
     let mut k = 0;
     let s = best_s(7, || {
         for _ in 0..motions {
             k += 1;
-            let request = MotionRequest::from_operator(0, head(k));
-            let outcome = propagator.propagate(&mut chain, &obstacles, &request).expect("right");
+            let request = MotionRequest::from_operator(0, to(k));
+            let outcome = propagator.propagate(&mut chain, obstacles, &request).expect("right");
             assert!(outcome.motion().is_some(), "nothing is in the way");
         }
     });

@@ -19,8 +19,8 @@ use std::ops::Range;
 /// turn keep a skin, and without this room each direction would be blocked by it.
 const TURN_ROOM_M: f64 = 10.0 * SKIN_M;
 
-/// Rounding of gaps, meters.
-const ROUNDING_M: f64 = 1e-12;
+/// Rounding of gaps between parts that move alike, meters.
+pub(super) const ROUNDING_M: f64 = 1e-12;
 
 /// A part of a chain; the order breaks ties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -4,14 +4,11 @@ use super::chain::{Chain, LENGTH_TOLERANCE_M};
 use super::geometry::{Aabb, Point, angle_between_rad, distance, sub};
 use super::motion_context::{BEND_TOLERANCE_RAD, TOLERANCE_M};
 use super::obstacle::Obstacles;
-use super::own_body::{ChainPart, deepest_new_overlap};
+use super::own_body::{ChainPart, ROUNDING_M, deepest_new_overlap, find_own_passage};
 use super::propagate::Propagator;
-use super::rod_bvh::RodBvh;
+use super::tunneling::find_tunneling;
 use super::veto::{Veto, VetoReason};
 use std::f64::consts::PI;
-
-/// Rounding of depths, meters.
-const ROUNDING_M: f64 = 1e-12;
 
 /// A part that objects, with the reason, and the obstacle in its way.
 type PartVeto = (usize, VetoReason, Option<u32>);
@@ -29,23 +26,57 @@ impl<const D: usize> Propagator<D> {
     ) -> Option<Veto<D>> {
         let veto = find_connector_veto(chain, before)
             .or_else(|| find_obstacle_veto(chain, obstacles, before))
-            .or_else(|| self.find_own_veto(chain, before));
-        match veto {
-            Some((by, reason, obstacle)) => {
-                Some(Veto { by, from: k, reason, obstacle, reached: before[k] })
-            }
-            None => self.find_path_veto(chain, obstacles, before, k),
-        }
+            .or_else(|| self.find_own_veto(chain, before))
+            .or_else(|| self.find_passage_veto(chain, obstacles, before));
+        veto.map(|veto| make_veto(veto, before, k))
+    }
+
+    /// Returns the same for the paths alone: an obstacle that a rod tunneled through or, where its own parts are solid,
+    /// a part of the chain. The places at its ends are not checked.
+    pub fn find_path_veto(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        before: &[Point<D>],
+        k: usize,
+    ) -> Option<Veto<D>> {
+        let veto = self.find_passage_veto(chain, obstacles, before);
+        veto.map(|veto| make_veto(veto, before, k))
     }
 
     fn find_own_veto(&mut self, chain: &Chain<D>, before: &[Point<D>]) -> Option<PartVeto> {
         if !self.rules.self_collision {
             return None;
         }
-        let mut tree = RodBvh::default();
-        let [_, other] = deepest_new_overlap(chain, before, &mut tree, TOLERANCE_M)?.parts;
+        let overlap = deepest_new_overlap(chain, before, &mut self.own_rods, TOLERANCE_M)?;
+        let [_, other] = overlap.parts;
         Some((other.last_connector(), VetoReason::SelfCollision, None))
     }
+
+    fn find_passage_veto(
+        &mut self,
+        chain: &Chain<D>,
+        obstacles: &Obstacles<D>,
+        before: &[Point<D>],
+    ) -> Option<PartVeto> {
+        if let Some(tunneled) = find_tunneling(chain, before, obstacles, 0.0) {
+            return Some((tunneled.rod + 1, VetoReason::WouldTunnel, Some(tunneled.obstacle)));
+        }
+        if !self.rules.self_collision {
+            return None;
+        }
+        let [_, other] = find_own_passage(chain, before, &mut self.own_rods)?;
+        Some((other.last_connector(), VetoReason::SelfCollision, None))
+    }
+}
+
+/// Returns the veto of a motion of connector `k`, which has reached nothing: it was at `before`.
+fn make_veto<const D: usize>(
+    (by, reason, obstacle): PartVeto,
+    before: &[Point<D>],
+    k: usize,
+) -> Veto<D> {
+    Veto { by, from: k, reason, obstacle, reached: before[k] }
 }
 
 /// Returns the first connector that is where it may not be, whose rod is out of its limits, or that bends too far.

@@ -53,26 +53,26 @@ pub(super) struct ConstraintProjector<const D: usize> {
     diagonal: Vec<f64>,
     side: Vec<f64>,
     errors_m: Vec<f64>,
-    /// Connectors caught at an end of their rail, and coordinates at a side of their box.
-    caught: Vec<[bool; D]>,
+    /// For each connector whether it is at an end of its rail, or at a side of its box along each axis.
+    at_limit: Vec<[bool; D]>,
     tree: RodBvh<D>,
 }
 
 /// The chain before the motion, and the connector that leads it.
 #[derive(Clone, Copy)]
-struct Held<'a, const D: usize> {
+struct ProjectionContext<'a, const D: usize> {
     chain: &'a Chain<D>,
     k: usize,
 }
 
-impl<const D: usize> Held<'_, D> {
+impl<const D: usize> ProjectionContext<'_, D> {
     fn connector(&self, i: usize) -> &Connector<D> {
         &self.chain.connectors()[i]
     }
 
     /// Returns the part of a push that moves connector `i`.
     #[inline]
-    fn yielding(&self, i: usize, push: Point<D>, caught: [bool; D]) -> Point<D> {
+    fn free_part(&self, i: usize, push: Point<D>, at_limit: [bool; D]) -> Point<D> {
         let connector = self.connector(i);
         if i == self.k || connector.is_still() {
             return [0.0; D];
@@ -80,14 +80,14 @@ impl<const D: usize> Held<'_, D> {
         match connector.mobility {
             Mobility::Fixed => [0.0; D],
             Mobility::Free => push,
-            Mobility::OnSegment(_) if caught[0] => [0.0; D],
+            Mobility::OnSegment(_) if at_limit[0] => [0.0; D],
             Mobility::OnSegment([a, b]) => {
                 let along = normalized(sub(b, a)).unwrap_or([0.0; D]);
                 scaled(along, dot(along, push))
             }
             Mobility::OnPlane { normal, .. } => add_scaled(push, normal, -dot(normal, push)),
             Mobility::InBox { .. } => {
-                std::array::from_fn(|axis| if caught[axis] { 0.0 } else { push[axis] })
+                std::array::from_fn(|axis| if at_limit[axis] { 0.0 } else { push[axis] })
             }
         }
     }
@@ -103,9 +103,9 @@ impl<const D: usize> ConstraintProjector<D> {
         k: usize,
         is_solid: bool,
     ) -> Result<(), ProjectionFailure> {
-        let held = Held { chain, k };
+        let context = ProjectionContext { chain, k };
         let target = points[k];
-        let settled = self.settle(held, points, is_solid);
+        let settled = self.settle(context, points, is_solid);
         if settled != Err(ProjectionFailure::Lengths) {
             return settled;
         }
@@ -118,10 +118,10 @@ impl<const D: usize> ConstraintProjector<D> {
             for i in 1..points.len().saturating_sub(1) {
                 let along = sub(chain.points()[i + 1], chain.points()[i - 1]);
                 let across = perpendicular(normalized(along).unwrap_or(unit_x()));
-                let by = held.yielding(i, scaled(across, side * off_m), [false; D]);
+                let by = context.free_part(i, scaled(across, side * off_m), [false; D]);
                 points[i] = add_scaled(points[i], by, 1.0);
             }
-            if self.settle(held, points, is_solid).is_ok() {
+            if self.settle(context, points, is_solid).is_ok() {
                 return Ok(());
             }
         }
@@ -131,44 +131,48 @@ impl<const D: usize> ConstraintProjector<D> {
     /// Corrects lengths and pushes parts apart in turn, until both are as they should be.
     fn settle(
         &mut self,
-        held: Held<'_, D>,
+        context: ProjectionContext<'_, D>,
         points: &mut [Point<D>],
         is_solid: bool,
     ) -> Result<(), ProjectionFailure> {
-        self.caught.clear();
-        self.caught.resize(points.len(), [false; D]);
+        self.at_limit.clear();
+        self.at_limit.resize(points.len(), [false; D]);
         for _ in 0..MAX_PUSHES {
-            if !self.correct_lengths(held, points) {
+            if !self.correct_lengths(context, points) {
                 return Err(ProjectionFailure::Lengths);
             }
-            if !is_solid || !self.push_apart(held, points) {
+            if !is_solid || !self.push_apart(context, points) {
                 return Ok(());
             }
         }
         Err(ProjectionFailure::OwnBody)
     }
 
-    fn correct_lengths(&mut self, held: Held<'_, D>, points: &mut [Point<D>]) -> bool {
-        let max_correction_m = MAX_CORRECTION * held.chain.max_rod_m();
+    fn correct_lengths(
+        &mut self,
+        context: ProjectionContext<'_, D>,
+        points: &mut [Point<D>],
+    ) -> bool {
+        let max_correction_m = MAX_CORRECTION * context.chain.max_rod_m();
         for _ in 0..MAX_STEPS {
-            if self.measure(held, points) <= ERROR_TOLERANCE_M {
+            if self.measure(context, points) <= ERROR_TOLERANCE_M {
                 return true;
             }
-            self.assemble_equations(held);
+            self.assemble_equations(context);
             self.eliminate();
-            if self.apply_corrections(held, points) > max_correction_m {
+            if self.apply_corrections(context, points) > max_correction_m {
                 return false;
             }
         }
-        self.measure(held, points) <= ERROR_TOLERANCE_M
+        self.measure(context, points) <= ERROR_TOLERANCE_M
     }
 
     /// Measures directions and errors of the rods; returns the greatest error, meters.
-    fn measure(&mut self, held: Held<'_, D>, points: &[Point<D>]) -> f64 {
+    fn measure(&mut self, context: ProjectionContext<'_, D>, points: &[Point<D>]) -> f64 {
         self.directions.clear();
         self.errors_m.clear();
         let mut worst_m = 0.0_f64;
-        for (ends, rod) in points.windows(2).zip(held.chain.rods()) {
+        for (ends, rod) in points.windows(2).zip(context.chain.rods()) {
             let along = sub(ends[1], ends[0]);
             let length_m = norm(along);
             let error_m = length_m - length_m.clamp(rod.min_m, rod.max_m);
@@ -180,12 +184,12 @@ impl<const D: usize> ConstraintProjector<D> {
         worst_m
     }
 
-    fn assemble_equations(&mut self, held: Held<'_, D>) {
+    fn assemble_equations(&mut self, context: ProjectionContext<'_, D>) {
         self.diagonal.clear();
         self.side.clear();
         for (i, u) in self.directions.iter().enumerate() {
-            let inner = held.yielding(i, *u, self.caught[i]);
-            let outer = held.yielding(i + 1, *u, self.caught[i + 1]);
+            let inner = context.free_part(i, *u, self.at_limit[i]);
+            let outer = context.free_part(i + 1, *u, self.at_limit[i + 1]);
             let response = dot(inner, *u) + dot(outer, *u);
             // A rod within its limits, or held at both ends, has the equation "no correction".
             self.diagonal.push(if response > 0.0 { response + DAMPING } else { 1.0 });
@@ -209,7 +213,11 @@ impl<const D: usize> ConstraintProjector<D> {
     }
 
     /// Moves the connectors by the solution; returns the longest correction, meters.
-    fn apply_corrections(&mut self, held: Held<'_, D>, points: &mut [Point<D>]) -> f64 {
+    fn apply_corrections(
+        &mut self,
+        context: ProjectionContext<'_, D>,
+        points: &mut [Point<D>],
+    ) -> f64 {
         let mut longest_m = 0.0_f64;
         for i in 0..points.len() {
             let mut push = [0.0; D];
@@ -219,27 +227,32 @@ impl<const D: usize> ConstraintProjector<D> {
             if let Some(before) = i.checked_sub(1) {
                 push = add_scaled(push, self.directions[before], -self.errors_m[before]);
             }
-            let by = held.yielding(i, push, self.caught[i]);
+            let by = context.free_part(i, push, self.at_limit[i]);
             points[i] = add_scaled(points[i], by, 1.0);
             longest_m = longest_m.max(norm(by));
-            self.keep_mobility(held, i, points);
+            self.keep_mobility(context, i, points);
         }
         longest_m
     }
 
-    /// Puts a connector back where its mobility allows it to be, and remembers the limit that caught it.
-    fn keep_mobility(&mut self, held: Held<'_, D>, i: usize, points: &mut [Point<D>]) {
-        let connector = held.connector(i);
-        if i == held.k || connector.is_still() || connector.mobility == Mobility::Free {
+    /// Puts a connector back where its mobility allows it to be, and remembers the limit at which it is.
+    fn keep_mobility(
+        &mut self,
+        context: ProjectionContext<'_, D>,
+        i: usize,
+        points: &mut [Point<D>],
+    ) {
+        let connector = context.connector(i);
+        if i == context.k || connector.is_still() || connector.mobility == Mobility::Free {
             return;
         }
         let wanted = points[i];
-        points[i] = connector.mobility.project(wanted, held.chain.points()[i]);
+        points[i] = connector.mobility.project(wanted, context.chain.points()[i]);
         match connector.mobility {
-            Mobility::OnSegment(ends) if ends.contains(&points[i]) => self.caught[i][0] = true,
+            Mobility::OnSegment(ends) if ends.contains(&points[i]) => self.at_limit[i][0] = true,
             Mobility::InBox { .. } => {
                 for axis in 0..D {
-                    self.caught[i][axis] |= points[i][axis] != wanted[axis];
+                    self.at_limit[i][axis] |= points[i][axis] != wanted[axis];
                 }
             }
             _ => {}
@@ -247,8 +260,8 @@ impl<const D: usize> ConstraintProjector<D> {
     }
 
     /// Pushes parts apart that are nearer than they may be; returns whether there were any.
-    fn push_apart(&mut self, held: Held<'_, D>, points: &mut [Point<D>]) -> bool {
-        let chain = held.chain;
+    fn push_apart(&mut self, context: ProjectionContext<'_, D>, points: &mut [Point<D>]) -> bool {
+        let chain = context.chain;
         let rods = chain.rods().len();
         let bounds = |points: &[Point<D>], rod: usize| -> Aabb<D> {
             chain.rod_bounds(rod, [points[rod], points[rod + 1]], 0.0)
@@ -261,7 +274,7 @@ impl<const D: usize> ConstraintProjector<D> {
             tree.visit(&near, |other| {
                 if other >= rod {
                     for parts in part_pairs(rod, other, rods) {
-                        has_pushed |= self.push_pair_apart(held, points, parts);
+                        has_pushed |= self.push_pair_apart(context, points, parts);
                     }
                 }
             });
@@ -272,11 +285,11 @@ impl<const D: usize> ConstraintProjector<D> {
 
     fn push_pair_apart(
         &self,
-        held: Held<'_, D>,
+        context: ProjectionContext<'_, D>,
         points: &mut [Point<D>],
         [one, other]: [ChainPart; 2],
     ) -> bool {
-        let chain = held.chain;
+        let chain = context.chain;
         let Some(separation_m) = chain.min_separation_m(one, other) else { return false };
         let nearest = between_segments(one.ends(points), other.ends(points));
         if nearest.distance_m >= separation_m {
@@ -294,11 +307,13 @@ impl<const D: usize> ConstraintProjector<D> {
         let response: f64 = levers
             .iter()
             .flatten()
-            .map(|(k, lever)| lever * lever * dot(held.yielding(*k, away, self.caught[*k]), away))
+            .map(|(k, lever)| {
+                lever * lever * dot(context.free_part(*k, away, self.at_limit[*k]), away)
+            })
             .sum();
         if response > MIN_RESPONSE {
             for (k, lever) in levers.into_iter().flatten() {
-                let by = held.yielding(k, away, self.caught[k]);
+                let by = context.free_part(k, away, self.at_limit[k]);
                 points[k] = add_scaled(points[k], by, depth_m * lever / response);
             }
         }

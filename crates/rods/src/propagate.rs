@@ -46,7 +46,7 @@ pub struct Propagator<const D: usize> {
     /// The reaction of free connectors, unless it is the built-in one.
     reaction: Option<Arc<dyn Reaction>>,
     tentative: TentativePositions<D>,
-    own_rods: RodBvh<D>,
+    pub(super) own_rods: RodBvh<D>,
     motion_bounds: SeparationBounds<D>,
     /// When to try proofs of sub-steps among obstacles.
     proofs: SeparationProofSchedule,

@@ -1,18 +1,13 @@
 //! Checks of a chain's own body that concern more than one reaction: of the neighbors of a part where a sweep ends,
-//! and of the paths of all parts at once.
+//! and of the paths of all parts that a request moves.
 
 use super::{ConnectorVeto, PropagationContext, Propagator};
 use crate::chain::Chain;
-use crate::geometry::{Point, between_segments};
+use crate::geometry::between_segments;
 use crate::motion_context::{IncompleteVeto, MotionContext, contact_distance_m};
-use crate::obstacle::Obstacles;
-use crate::own_body::{ChainPart, ChainSweep, find_own_passage};
+use crate::own_body::{ChainPart, ChainSweep, ROUNDING_M};
 use crate::pass::ChainDirection;
-use crate::tunneling::find_tunneling;
-use crate::veto::{Veto, VetoReason};
-
-/// Rounding of gaps between parts that move alike, meters.
-const ROUNDING_M: f64 = 1e-12;
+use crate::veto::VetoReason;
 
 impl<const D: usize> MotionContext<'_, D> {
     /// Returns whether the parts beyond a slave at which a sweep ends keep their distances from those before it. Parts
@@ -89,34 +84,6 @@ impl<const D: usize> MotionContext<'_, D> {
 }
 
 impl<const D: usize> Propagator<D> {
-    /// Returns the objection to a motion of connector `k` that brought a chain from `before` to its present place,
-    /// every connector on a straight path: an obstacle that a rod tunneled through or, where its own parts are solid,
-    /// a part of the chain. The places at its ends are not checked.
-    pub fn find_path_veto(
-        &mut self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
-        before: &[Point<D>],
-        k: usize,
-    ) -> Option<Veto<D>> {
-        let veto = |by: usize, reason: VetoReason, obstacle: Option<u32>| Veto {
-            by,
-            from: k,
-            reason,
-            obstacle,
-            reached: before[k],
-        };
-        if let Some(tunneled) = find_tunneling(chain, before, obstacles, 0.0) {
-            let obstacle = Some(tunneled.obstacle);
-            return Some(veto(tunneled.rod + 1, VetoReason::WouldTunnel, obstacle));
-        }
-        if !self.rules.self_collision {
-            return None;
-        }
-        let [_, other] = find_own_passage(chain, before, &mut self.own_rods)?;
-        Some(veto(other.last_connector(), VetoReason::SelfCollision, None))
-    }
-
     /// Checks the paths of all parts that have moved against each other. Each reaction was checked against parts at
     /// rest; that two parts pass each other, both in motion, only this check sees.
     pub(super) fn check_own_paths(&self, chain: &Chain<D>) -> Result<(), ConnectorVeto> {

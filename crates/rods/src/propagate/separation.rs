@@ -1,8 +1,9 @@
 //! Motions with self-collision in which no part of the chain comes near another.
 //!
 //! Most motions are like that. They are made without a test of each pair of parts, and
-//! [`SeparationBounds`](crate::motion_bounds::SeparationBounds) proves afterwards that no test could have objected; where the proof fails, the
-//! motion is taken back and made with all tests. The result is the same bits either way.
+//! [`SeparationBounds`](crate::motion_bounds::SeparationBounds) proves afterwards that no test could have objected; where
+//! the proof fails, the motion is taken back and made with all tests. A sub-step has the same bits either way. A whole
+//! request that is proven is one step instead of several, whatever the worker did before.
 
 use super::{InitiatingConnectors, MotionEffects, Propagator, can_only_self_collide};
 use crate::chain::Chain;

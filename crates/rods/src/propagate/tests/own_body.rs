@@ -206,32 +206,24 @@ fn the_ends_of_a_chain_do_not_meet_in_one_place() {
     assert!(apart_m > 0.1 - TOLERANCE_M, "{apart_m}");
 }
 
-/// The gaps of a thin chain say nothing about a thick one of as many connectors at the same places.
+/// The gaps of a thin chain say nothing about a thick one of as many connectors at the same places: the head of a chain
+/// that lies double moves toward its tail.
 #[test]
 fn chains_that_share_a_propagator_move_as_if_each_had_its_own() {
+    let strand = |y: f64| (0..10).map(move |i| [0.5 * f64::from(i), y]);
+    let points: Vec<_> = strand(0.0).chain(strand(0.21).rev()).collect();
+    let double = |radius_m: f64| {
+        let rod = Rod { min_m: 0.2, max_m: 0.5, radius_m };
+        Chain::new(points.clone(), vec![Connector::free(radius_m); 20], vec![rod; 19]).unwrap()
+    };
+    let (mut thin, mut thick) = (double(0.01), double(0.1));
     let rules = ReactionRules { self_collision: true, ..ReactionRules::default() };
-    let mut shared = Propagator::<2>::new(rules);
-    for seed in 0..20 {
-        let thin_rod = Rod { min_m: 0.4, max_m: 0.5, radius_m: 0.005 };
-        let thin = crooked::<2>(seed, 40, thin_rod, 0.01);
-        let thick_rod = Rod { radius_m: 0.08, ..thin_rod };
-        let points = thin.points().to_vec();
-        let thick =
-            Chain::new(points, vec![Connector::free(0.1); 41], vec![thick_rod; 40]).unwrap();
-        let mut own = Propagator::new(rules);
-        let mut chains = [thin, thick.clone()];
-        let mut alone = thick;
-        let mut walk = Wanderer::new(seed);
-        for step in 0..60 {
-            let to = walk.next(alone.points()[0], 0.1);
-            let mode = VetoEffect::AsFarAsPossible;
-            let request = MotionRequest { mode, ..MotionRequest::from_operator(0, to) };
-            let obstacles = Obstacles::default();
-            for chain in &mut chains {
-                shared.propagate(chain, &obstacles, &request).unwrap();
-            }
-            own.propagate(&mut alone, &obstacles, &request).unwrap();
-            assert_eq!(bits(&chains[1]), bits(&alone), "{seed} {step}");
-        }
+    let mut propagator = Propagator::new(rules);
+    for (chain, up_m) in [(&mut thin, 0.001), (&mut thick, 0.03)] {
+        let mode = VetoEffect::AsFarAsPossible;
+        let request = MotionRequest { mode, ..MotionRequest::from_operator(0, [0.0, up_m]) };
+        propagator.propagate(chain, &Obstacles::default(), &request).unwrap();
     }
+    let apart_m = distance(thick.points()[0], thick.points()[19]);
+    assert!(apart_m > 0.2 - TOLERANCE_M, "{apart_m}");
 }
