@@ -79,6 +79,15 @@ def trajectories(folder: str | os.PathLike[str], *, every: int = 1) -> list[ArmT
     ``folder`` is the folder of a run; only cycles that are multiples of ``every`` count.
 
     Raises InputError when the run has no arms, or a file is damaged.
+
+    >>> import sidestep, tempfile
+    >>> from pathlib import Path
+    >>> folder = Path(tempfile.mkdtemp()) / "run"
+    >>> with sidestep.Simulation("scenarios/chain/arm.toml", out=folder) as sim:
+    ...     _ = sim.run(20)
+    >>> [motion] = sidestep.trajectories(folder, every=5)
+    >>> motion.positions.shape == (len(motion.times_s), len(motion.joints))
+    True
     """
     return arm_trajectories(folder, checked_int("every", every, 1, 2**32))
 

@@ -95,6 +95,7 @@ def test_every_function_and_method_has_an_example():
     own = {
         "rebuild", "unpack_scenario", "rows_by_name", "table_names", "run_sweep", "run_task", "compare_methods",
         "learn_effector", "learn_sensor", "minimize_objective", "minimize_pairs", "Arm.forward", "Arm.inverse",
+        "arm_trajectories",
     }  # fmt: skip
     # Those that have their example where they are made.
     elsewhere = {"Learned.profile", "sidestep.learn.Learned.profile", "Each.of_team", "Agent.decide"}
