@@ -13,7 +13,7 @@ const MAGIC: &[u8; 8] = b"SIDESTEP";
 const CHECKSUM_BYTES: usize = 16;
 
 /// Version of the checkpoint layout; checkpoints of any other version are refused.
-pub const FORMAT_VERSION: u32 = 6;
+pub const FORMAT_VERSION: u32 = 7;
 
 /// The program, world, scenario and cycle that a checkpoint belongs to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

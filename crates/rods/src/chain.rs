@@ -7,6 +7,7 @@ use super::geometry::{self, Point, angle_between_rad, distance, dot, norm, sub};
 use super::veto::VetoReason;
 use sidestep_kernel::InputError;
 use std::f64::consts::{PI, SQRT_2};
+use std::ops::Range;
 
 /// Tolerance of the rods' lengths, meters. One motion keeps lengths to about 1e-14 m, so a tolerance far above rounding
 /// refuses no motion, and errors of many motions do not add up because each one sets the length anew.
@@ -194,6 +195,22 @@ impl<const D: usize> Chain<D> {
             ));
         }
         Ok(chain)
+    }
+
+    /// Returns some connectors and the rods between them as a chain of its own; these rods need not be within their limits.
+    ///
+    /// # Errors
+    /// When two neighbors are at the same place.
+    ///
+    /// # Panics
+    /// If the chain does not have these connectors.
+    pub fn part(&self, connectors: Range<usize>) -> Result<Self, InputError> {
+        let rods = connectors.start..connectors.end.saturating_sub(1).max(connectors.start);
+        Self::new_broken(
+            self.points[connectors.clone()].to_vec(),
+            self.connectors[connectors].to_vec(),
+            self.rods[rods].to_vec(),
+        )
     }
 
     /// Returns a chain whose rods need not be within their limits yet, because it is to be

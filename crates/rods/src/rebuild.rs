@@ -191,11 +191,7 @@ fn pull_end<const D: usize>(
     // Passes converge slowly where the parts are stretched out, so they get some slack.
     let fraction = 1.0 - SLACK_RATIO * have_m / distance(at, to);
     let target: Point<D> = lerp(at, to, fraction);
-    let mut alone = Chain::new_broken(
-        chain.points()[low..=high].to_vec(),
-        chain.connectors()[low..=high].to_vec(),
-        chain.rods()[low..high].to_vec(),
-    )?;
+    let mut alone = chain.part(low..high + 1)?;
     let request = MotionRequest::from_operator(stub - low, target);
     // If the end cannot move, the check of all rods that follows says so.
     let _ = Propagator::default().propagate(&mut alone, &Obstacles::default(), &request)?;

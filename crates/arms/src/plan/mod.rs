@@ -143,6 +143,16 @@ pub fn plan_joints<const D: usize>(
     Ok(find_path(space, Vec::new(), goals, draws))
 }
 
+/// Plans a path in a space of a caller's own: the postures after the present one, the goal at the end; none if the search
+/// found none.
+pub fn plan_path<S: ConfigurationSpace>(
+    space: &S,
+    goal: S::Posture,
+    draws: &mut Draws,
+) -> Option<Vec<S::Posture>> {
+    find_path(space, Vec::new(), vec![goal], draws)
+}
+
 /// Returns the shortened path to one of the goals, if there is any, perhaps through one of the postures on the way that are
 /// worth a try.
 fn find_path<S: ConfigurationSpace>(

@@ -245,7 +245,7 @@ impl<const D: usize> ChainWorldState<D> {
             plans: self.save_component(cycle, |body| &body.plan),
             escape_plans: self.save_component(cycle, |body| &body.escape_plan),
             standstills: self.save_component(cycle, |body| &body.standstill),
-            waited: self.save_component(cycle, |body| &body.scattered),
+            gathering: self.save_component(cycle, |body| &body.scattered),
             externals: self.save_component(cycle, |body| &body.external),
             missing: self.save_component(cycle, |body| &body.missing),
             submitted: self.save_component(cycle, |body| &body.submitted),

@@ -42,6 +42,8 @@ pub(crate) mod purpose {
     pub(crate) const BURST_LOSS: Purpose = Purpose(9);
     /// Drivers of a program's own.
     pub(crate) const DRIVER: Purpose = Purpose(10);
+    /// Places where the parts of a broken chain are joined again, and their ways there.
+    pub(crate) const GATHER: Purpose = Purpose(11);
 }
 
 /// Cutoff of a random throw, in standard deviations, so that the claim of a chain that breaks can hold all its parts.

@@ -9,6 +9,7 @@
 //! A part calls only parts to the right of it or below it.
 //!
 //! ```text
+//! broken.rs, gather.rs -> part_ways.rs
 //! broken.rs, gather.rs -> bounds.rs (escape) -> drive.rs -> bounds.rs (back into the claim) -> orders.rs
 //!                      -> joint_motion.rs -> follow.rs -> measure.rs
 //! drive.rs     -> task_moves.rs -> wheels.rs, plan.rs, orders.rs   what the initiator wants
@@ -38,6 +39,7 @@ mod negotiation;
 mod orders;
 mod outcome;
 mod own_driver;
+mod part_ways;
 mod plan;
 mod situation;
 mod task_moves;
@@ -177,7 +179,7 @@ fn run_cycle<const D: usize>(
         return;
     }
     if acting.body.scattered.is_some() {
-        gather::gather_parts(context, acting.body, &mut acting.sink);
+        gather::gather_parts(context, &mut acting);
     } else {
         act_whole_chain(context, &mut acting, &mut escaping, inputs, follows);
     }

@@ -1,10 +1,8 @@
 //! Whole runs of small scenarios: what chains do to each other, and what is told of it.
 
+use crate::ChainRun;
 use crate::events::EventKind;
-use crate::metrics::ChainTally;
 use crate::scenario::ChainScenario;
-use crate::state::Snapshot;
-use crate::{ChainRun, ChainWorldState};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::interrupt::Interrupt;
 use sidestep_kernel::ports::{ColumnValues, MemoryRecorder, Recorder};
@@ -17,6 +15,7 @@ use sidestep_scenario::Source as Text;
 use sidestep_testing::root;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+mod broken;
 mod own_body;
 
 /// Returns a run of a scenario in the plane.
@@ -162,136 +161,6 @@ fn a_navigator_goes_round_a_corridor_that_comes_back_to_its_start() {
     assert!(!run.is_over() && count(&events, "done") == 0, "{events:?}");
     let (progress, at) = (run.metrics().progress, run.state().body(0).chain.points()[0]);
     assert!(at[0] > 1.0 && (0.02..0.5).contains(&progress), "{progress} at {at:?}");
-}
-
-/// A chain that breaks, and is to be joined again, with more in the way.
-fn broken(joins_s: &str, by_m: f64, more: &str) -> String {
-    format!(
-        "seed = 3\ncycles = 1500\n{more}\n[[chains]]\nconnectors = 6\nrod_m = [0.4, 0.5]\n\
-         tasks = [{{ kind = \"rest\", lasts_s = 8.0 }}]\n\
-         changes = [{{ at_s = {joins_s}, reform = true }}, {{ at_s = 1.0, scatter = [1, 4], by_m = {by_m} }}]\n"
-    )
-}
-
-#[test]
-fn a_chain_that_breaks_in_a_cycle_can_be_joined_in_it_wherever_the_file_says_so() {
-    // Both are in cycle 50.
-    let mut run = run(&broken("1.005", 0.5, ""));
-    let events = told(&mut run, 1500);
-    let kinds: Vec<_> = events.iter().map(|(kind, _)| kind.as_str()).collect();
-    assert_eq!(&kinds[..2], ["broken", "reforming"], "{events:?}");
-    assert_eq!(count(&events, "reformed"), 1, "{events:?}");
-    assert!(run.is_over() && run.state().body(0).scattered.is_none());
-}
-
-/// Advances a run; asserts that no connector passes through its obstacles, nor is deeper in one than by rounding.
-fn assert_nothing_is_passed(run: &mut ChainRun<2>, cycles: u64, case: &str) -> usize {
-    let obstacles = run.world().obstacles.clone();
-    let (mut before, mut reformed) = (run.state().body(0).chain.points().to_vec(), 0);
-    while run.cycle() < cycles && !run.is_over() {
-        let was_whole = run.state().body(0).scattered.is_none();
-        run.advance(1);
-        let body = run.state().body(0);
-        let is_whole = body.scattered.is_none();
-        reformed += usize::from(is_whole && !was_whole);
-        // A part that is thrown flies over whatever is below.
-        let is_thrown = was_whole && !is_whole;
-        for (k, (was, at)) in before.iter().zip(body.chain.points()).enumerate() {
-            let from = if is_thrown { at } else { was };
-            let gap_m = obstacles.clearance_m([*from, *at], 0.05, 1.0);
-            assert!(gap_m > -1e-9, "{case}, cycle {}: {k} is {gap_m} m away", run.cycle());
-        }
-        for rod in body.chain.points().windows(2).filter(|_| is_whole) {
-            assert!(obstacles.clearance_m([rod[0], rod[1]], 0.01, 1.0) > -1e-9, "{case}");
-        }
-        before.copy_from_slice(body.chain.points());
-    }
-    reformed
-}
-
-#[test]
-fn parts_that_come_back_pass_through_nothing_and_the_chain_is_whole_only_where_there_is_room() {
-    let mut reformed = 0;
-    for seed in 1..=12 {
-        let wall = "[[obstacles]]\nends_m = [[-1.2, 0.3], [-1.2, 30.0]]\nradius_m = 0.05";
-        let field = "[[fields]]\nlo_m = [-3.5, -1.5]\nhi_m = [1.0, 1.5]\npart = 0.06\nradius_m = 0.08\nkeep_m = 0.02";
-        for (more, by_m) in [(wall, 2.0), (field, 0.5), ("", 1.0)] {
-            let text = broken("1.5", by_m, more).replace("seed = 3", &format!("seed = {seed}"));
-            let case = format!("{seed} {by_m}");
-            reformed += assert_nothing_is_passed(&mut run(&text), 1500, &case);
-        }
-    }
-    assert!(reformed >= 12, "{reformed}");
-}
-
-#[test]
-fn parts_that_something_keeps_from_coming_back_are_told_with_what_it_is() {
-    let box_ = "[[obstacles]]\ncorners_m = [[-1.5, 0.3], [-0.5, 0.3], [-0.5, 0.5], [-1.5, 0.5]]\n";
-    let told_of = |seed: u32| {
-        let text = broken("1.5", 2.0, box_).replace("seed = 3", &format!("seed = {seed}"));
-        let mut run = run(&text);
-        let events = told(&mut run, 1500);
-        (count(&events, "not-reformed"), run.metrics().not_reformed, run.is_over())
-    };
-    let all: Vec<_> = (1..=12).map(told_of).collect();
-    assert!(all.iter().any(|(told, ..)| *told == 1), "{all:?}");
-    assert!(
-        all.iter().all(|(told, counted, is_over)| {
-            *told as u64 == *counted && (*told == 0) == *is_over
-        })
-    );
-}
-
-/// Nothing but the wait goes on, so it alone tells two of these states apart.
-#[test]
-fn the_time_for_which_scattered_parts_have_waited_is_a_part_of_the_state() {
-    let box_ = "[[obstacles]]\ncorners_m = [[-1.5, 0.3], [-0.5, 0.3], [-0.5, 0.5], [-1.5, 0.5]]\n";
-    let stuck = |seed: u32| {
-        let text = broken("1.5", 2.0, box_).replace("seed = 3", &format!("seed = {seed}"));
-        let events = told(&mut run(&text), 1500);
-        let is_stuck = ["reforming", "not-reformed"].iter().all(|kind| count(&events, kind) == 1);
-        is_stuck.then_some(text)
-    };
-    let text = (1..=12).find_map(stuck).expect("a chain that something keeps from coming together");
-    let mut whole = run(&text);
-    while whole.metrics().not_reformed == 0 {
-        whole.advance(1);
-    }
-    let ends = whole.cycle();
-    let mut run = run(&text);
-    run.advance(ends - 100);
-    let [before, after] = [0, 1].map(|cycles| {
-        run.advance(cycles);
-        Snapshot { cycle: 0, ..run.state().snapshot(0) }
-    });
-    assert_eq!(before.chains[0].points_m, after.chains[0].points_m, "nothing moves");
-    assert_ne!(before.digest(), after.digest());
-
-    // Also without its counts a chain that is restored gives up when it would have.
-    let world = run.world();
-    let state = ChainWorldState::restore(world, &after, vec![ChainTally::default()])
-        .expect("its own state");
-    let waited = |state: &ChainWorldState<2>| state.body(0).scattered.as_ref().map(|s| s.waited);
-    assert!(waited(&state).is_some_and(|cycles| cycles > 100), "{:?}", waited(&state));
-    assert_eq!(waited(&state), waited(run.state()));
-    let told = run.agent_metrics().to_string();
-    assert!(told.contains("\"not_reformed\"") && !told.contains("reform_waits"), "{told}");
-}
-
-#[test]
-fn parts_that_come_back_stay_in_the_claim_of_their_chain_from_the_first_cycle_on() {
-    let fast = "changes = [{ at_s = 1.0, scatter = [1, 4], by_m = 0.001 }, { at_s = 1.0, reform = true, speed_m_s = 50.0 }]";
-    let text = format!(
-        "seed = 1\ncycles = 100\n[[chains]]\nconnectors = 6\nrod_m = 0.5\n\
-         tasks = [{{ kind = \"rest\", lasts_s = 2.0 }}]\n{fast}\n\
-         [[chains]]\nconnectors = 2\nat_m = [0.0, 9.0]\nrod_m = 0.5\ntasks = [{{ kind = \"rest\" }}]\n"
-    );
-    let mut run = run(&text);
-    run.advance(51);
-    let (claim, body) = (run.state().claim(0), run.state().body(0));
-    let way_m = 50.0 * run.world().dt_s;
-    assert!(claim.lo[1] <= -way_m && claim.hi[1] >= way_m, "{claim:?}: {way_m} m a cycle");
-    assert!(body.chain.points().iter().all(|p| claim.lo[1] <= p[1] && p[1] <= claim.hi[1]));
 }
 
 /// A lift whose joint can bring its ends together, and a hinge on it.

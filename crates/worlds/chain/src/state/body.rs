@@ -78,6 +78,17 @@ pub struct ScatteredPartState {
     /// snapshot, so that chains whose parts are never blocked keep their digests.
     #[serde(skip)]
     pub(crate) waited: Cycle,
+    /// Way points of each scattered connector, and of the whole one on either side, around what stands between it and its
+    /// goal, coordinate after coordinate; the way from the last one to the goal is straight. Empty where no way had to be planned. In the same list of a snapshot.
+    #[serde(skip)]
+    pub(crate) way_points_m: Vec<Vec<f64>>,
+}
+
+impl ScatteredPartState {
+    /// Returns the number of connectors that have ways: the scattered ones, and the whole one on either side.
+    pub(crate) fn way_count(&self) -> usize {
+        (self.last - self.first) as usize + 3
+    }
 }
 
 /// A planned path to a target: the postures still to be reached, each in a straight line from the one before; at least

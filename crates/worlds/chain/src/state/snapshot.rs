@@ -68,6 +68,15 @@ pub struct ChainRecord {
     pub robots: Vec<Robot>,
 }
 
+/// What holds of scattered parts beside their record while obstacles are in their way.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct GatherRecord {
+    /// See [`ScatteredPartState::waited`].
+    pub(crate) waited: Cycle,
+    /// See [`ScatteredPartState::way_points_m`].
+    pub(crate) way_points_m: Vec<Vec<f64>>,
+}
+
 /// A state by id: the content of a checkpoint, covered by the digest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
@@ -85,8 +94,8 @@ pub struct Snapshot {
     pub(crate) escape_plans: SnapshotComponentRecords<EscapePlan>,
     /// Cycles for which navigators stand because something moves ahead.
     pub(crate) standstills: SnapshotComponentRecords<u32>,
-    /// Cycles for which scattered parts have waited for an obstacle in their way.
-    pub(crate) waited: SnapshotComponentRecords<Cycle>,
+    /// What obstacles have kept scattered parts from, and the ways around them.
+    pub(crate) gathering: SnapshotComponentRecords<GatherRecord>,
     /// Orders from external callers, and their results.
     pub(crate) externals: SnapshotComponentRecords<ExternalControlState>,
     /// Lost connectors, as known to the agents of their chain.
@@ -205,14 +214,29 @@ impl SnapshotComponent for DriverMemory {
 
 /// The rest of the scattered parts is in the record of their chain.
 impl SnapshotComponent for Option<ScatteredPartState> {
-    type Record = Cycle;
+    type Record = GatherRecord;
 
-    fn save(&self, _: Cycle) -> Option<Cycle> {
-        Some(self.as_ref()?.waited).filter(|waited| *waited > 0)
+    fn save(&self, _: Cycle) -> Option<GatherRecord> {
+        let ScatteredPartState { waited, way_points_m, .. } = self.as_ref()?;
+        let is_free = *waited == 0 && way_points_m.is_empty();
+        (!is_free).then(|| GatherRecord { waited: *waited, way_points_m: way_points_m.clone() })
     }
 
-    fn restore(&mut self, waited: &Cycle, _: &ExpectedChainSizes) -> Result<(), CheckpointError> {
-        self.as_mut().ok_or(CheckpointError::Damaged)?.waited = *waited;
+    fn restore(
+        &mut self,
+        record: &GatherRecord,
+        owner: &ExpectedChainSizes,
+    ) -> Result<(), CheckpointError> {
+        let scattered = self.as_mut().ok_or(CheckpointError::Damaged)?;
+        let ways = &record.way_points_m;
+        let dimensions = owner.coordinates / owner.connectors.max(1);
+        let has_points = ways.iter().all(|way| way.len() % dimensions.max(1) == 0);
+        let is_of_parts = ways.is_empty() || ways.len() == scattered.way_count();
+        if !has_points || !is_of_parts {
+            return Err(CheckpointError::Damaged);
+        }
+        scattered.waited = record.waited;
+        scattered.way_points_m.clone_from(ways);
         Ok(())
     }
 }
@@ -364,7 +388,7 @@ impl Snapshot {
         restore_component(bodies, cycle, &self.plans, |body| &mut body.plan)?;
         restore_component(bodies, cycle, &self.escape_plans, |body| &mut body.escape_plan)?;
         restore_component(bodies, cycle, &self.standstills, |body| &mut body.standstill)?;
-        restore_component(bodies, cycle, &self.waited, |body| &mut body.scattered)?;
+        restore_component(bodies, cycle, &self.gathering, |body| &mut body.scattered)?;
         restore_component(bodies, cycle, &self.externals, |body| &mut body.external)?;
         restore_component(bodies, cycle, &self.missing, |body| &mut body.missing)?;
         restore_component(bodies, cycle, &self.submitted, |body| &mut body.submitted)?;
@@ -381,7 +405,7 @@ impl Snapshot {
         hash_nonempty_list(&mut hasher, &self.plans);
         hash_nonempty_list(&mut hasher, &self.escape_plans);
         hash_nonempty_list(&mut hasher, &self.standstills);
-        hash_nonempty_list(&mut hasher, &self.waited);
+        hash_nonempty_list(&mut hasher, &self.gathering);
         hash_nonempty_list(&mut hasher, &self.externals);
         hash_nonempty_list(&mut hasher, &self.missing);
         hash_nonempty_list(&mut hasher, &self.submitted);
