@@ -88,6 +88,8 @@ pub(crate) enum LegendSymbol {
     Ring,
     /// The mark of a leader.
     Leader,
+    /// The mark of a target.
+    Target,
 }
 
 /// A line of a legend; entries without a label are left out.
@@ -182,6 +184,9 @@ impl Legend {
                 );
             }
             LegendSymbol::Leader => leader_mark(svg, center, 0.36 * size, FAINT_INK),
+            LegendSymbol::Target => {
+                target_mark(svg, center, [0.3 * size, 0.5 * size], FAINT_INK);
+            }
             LegendSymbol::Ring => start_mark(svg, center, 0.36 * size, FAINT_INK),
         }
     }
@@ -205,6 +210,19 @@ pub(crate) fn start_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: 
 pub(crate) fn leader_mark(svg: &mut Svg, center: (f64, f64), radius: f64, color: &str) {
     start_mark(svg, center, radius, color);
     svg.circle(center, 0.45 * radius, format_args!(r#"class="leader" fill="{color}""#));
+}
+
+/// Draws the mark of a target: a ring, and a cross that reaches beyond it.
+pub(crate) fn target_mark(
+    svg: &mut Svg,
+    (x, y): (f64, f64),
+    [radius, reach]: [f64; 2],
+    color: &str,
+) {
+    let attributes = format!(r#"stroke="{color}" stroke-width="1.3""#);
+    svg.circle((x, y), radius, format_args!(r#"class="target" fill="none" {attributes}"#));
+    svg.line((x - reach, y), (x + reach, y), &attributes);
+    svg.line((x, y - reach), (x, y + reach), &attributes);
 }
 
 /// Draws the head, `head_px` long, of an arrow from one point to another.

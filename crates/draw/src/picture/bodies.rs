@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::Scene;
 use super::canvas::{Canvas, Px, corners};
-use crate::legend::leader_mark;
+use crate::legend::{leader_mark, target_mark};
 use crate::style::{INK, hex};
 use crate::svg::{Anchor, Svg, SvgNumber, TextStyle};
 use sidestep_kernel::geometry::dot;
@@ -315,8 +315,7 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
         let to = std::array::from_fn(|k| from[k] + ARROW_TIME_S * body.velocity_m_s[k]);
         arrow(svg, canvas.px(from), canvas.px(to));
     }
-    let goals: Vec<&Body> =
-        bodies.clone().filter(|body| body.kind == BodyKind::GOAL && body.part.is_some()).collect();
+    let goals: Vec<&Body> = bodies.clone().filter(|body| is_target(body)).collect();
     let are_few = goals.len() <= MAX_NUMBERED_TARGETS;
     for goal in goals {
         draw_target(svg, canvas, goal, goal.part.filter(|_| are_few).map(|part| part + 1));
@@ -331,6 +330,11 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     }
 }
 
+/// Returns whether a goal is one of the targets of a part, which are drawn with a cross.
+pub(super) fn is_target(body: &Body) -> bool {
+    body.kind == BodyKind::GOAL && body.part.is_some()
+}
+
 pub(super) fn is_leader(body: &Body) -> bool {
     body.state == BodyCondition::Leading
 }
@@ -339,13 +343,9 @@ pub(super) fn is_leader(body: &Body) -> bool {
 fn draw_target(svg: &mut Svg, canvas: &Canvas, goal: &Body, number: Option<u32>) {
     let Shape::Sphere { radius_m } = goal.shape else { return };
     let (x, y) = canvas.px(goal.pose.at_m);
-    let (radius_px, color) =
-        ((radius_m * canvas.px_per_m).max(MIN_GOAL_PX), hex(darker(body_color(goal.number))));
-    let attributes = format!(r#"stroke="{color}" stroke-width="1.3""#);
-    svg.circle((x, y), radius_px, format_args!(r#"class="target" fill="none" {attributes}"#));
+    let radius_px = (radius_m * canvas.px_per_m).max(MIN_GOAL_PX);
     let reach = radius_px + TARGET_PX;
-    svg.line((x - reach, y), (x + reach, y), &attributes);
-    svg.line((x, y - reach), (x, y + reach), &attributes);
+    target_mark(svg, (x, y), [radius_px, reach], &hex(darker(body_color(goal.number))));
     if let Some(number) = number {
         let words = TextStyle { halo: true, ..TextStyle::new(TARGET_LETTERS_PX, Anchor::Start) };
         svg.text(x + reach, y - radius_px, &number.to_string(), &words);

@@ -65,7 +65,8 @@ pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     let mut kinds = BTreeMap::new();
     for body in scene.scenery.bodies.iter().chain(&scene.frame.bodies) {
         let appearance = body.appearance(scene.scenery.dimensions);
-        if !appearance.legend.is_empty() {
+        // Targets have a mark of their own: a patch of color would look like an area.
+        if !bodies::is_target(body) && !appearance.legend.is_empty() {
             let is_own = appearance.color == body_color(body.number);
             let color = if is_own { ANY_COLOR } else { appearance.color };
             let key = (appearance.layer, appearance.legend);
@@ -74,6 +75,10 @@ pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     }
     for ((_, words), (color, opacity)) in kinds {
         entries.push(LegendEntry::new(swatch(color, opacity), words));
+    }
+    let mut shown = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
+    if shown.any(bodies::is_target) {
+        entries.push(LegendEntry::new(LegendSymbol::Target, BodyKind::GOAL.spec().noun));
     }
     if scene.frame.bodies.iter().any(bodies::is_leader) {
         entries.push(LegendEntry::new(LegendSymbol::Leader, "leader"));

@@ -98,6 +98,15 @@ fn a_leader_is_a_ring_and_its_followers_are_discs() {
 }
 
 #[test]
+fn the_legend_shows_a_target_as_the_picture_does() {
+    let target = Body { part: Some(0), ..ball(BodyKind::GOAL, 0, [3.0, 3.0, 0.0], 0.1) };
+    let scenery = Scenery { bodies: corners().into_iter().chain([target]).collect(), ..open(2) };
+    let svg = picture(&scenery, &Frame::default());
+    assert_eq!(svg.matches(r#"class="target""#).count(), 2, "in the picture and in the legend");
+    assert!(svg.contains(">goal<"), "{svg}");
+}
+
+#[test]
 fn walls_are_one_path_and_only_what_moves_has_an_arrow() {
     let wall = |k: u32| {
         let points_m = [0.0, 9.0].map(|y| [f64::from(k), y, 0.0]).to_vec();
