@@ -44,6 +44,51 @@ pub fn between_segments<const D: usize>(
     between_interiors([p, q], [a, b]).map_or(ends, |inside| ends.nearer(inside))
 }
 
+/// Returns the distance of two segments, meters: the bits of that of [`between_segments`], with one root in place of
+/// four.
+#[inline]
+pub fn distance_of_segments_m<const D: usize>([p, q]: [Point<D>; 2], [a, b]: [Point<D>; 2]) -> f64 {
+    let to_ends = [
+        sub(nearest_on_segment(a, p, q), a),
+        sub(nearest_on_segment(b, p, q), b),
+        sub(p, nearest_on_segment(p, a, b)),
+        sub(q, nearest_on_segment(q, a, b)),
+    ];
+    // The root of the least square is the least root: roots are rounded correctly, so they keep the order.
+    let least2 = to_ends.map(norm_squared).into_iter().fold(f64::INFINITY, f64::min);
+    let ends_m = least2.sqrt();
+    between_interiors([p, q], [a, b]).map_or(ends_m, |inside| inside.distance_m.min(ends_m))
+}
+
+/// Distance beyond the one asked for that a bound on a distance must show, meters: far more than rounding, so that it
+/// never says what the distance itself would not.
+const BOUND_MARGIN_M: f64 = 1e-9;
+
+/// Returns whether two segments are surely farther apart than `reach_m`: along the line through their middles. That
+/// takes no division, no branch and one root, and for rods of a chain it is nearly as good as the distance. `false` says
+/// nothing.
+#[inline]
+pub fn are_segments_surely_apart<const D: usize>(
+    [p, q]: [Point<D>; 2],
+    [a, b]: [Point<D>; 2],
+    reach_m: f64,
+) -> bool {
+    // Each is twice as long as it would be: the middles are half of these sums.
+    let between_middles = sub(add(p, q), add(a, b));
+    let extents = dot(sub(q, p), between_middles).abs() + dot(sub(b, a), between_middles).abs();
+    let length = norm(between_middles);
+    length * length - extents > 2.0 * (reach_m + BOUND_MARGIN_M) * length
+}
+
+/// Returns a distance that two segments surely have at least, meters, by the same bound; it may be below zero.
+#[inline]
+pub fn bound_of_segments_m<const D: usize>([p, q]: [Point<D>; 2], [a, b]: [Point<D>; 2]) -> f64 {
+    let between_middles = sub(add(p, q), add(a, b));
+    let extents = dot(sub(q, p), between_middles).abs() + dot(sub(b, a), between_middles).abs();
+    let length = norm(between_middles);
+    if length > 0.0 { 0.5 * (length - extents / length) - BOUND_MARGIN_M } else { -BOUND_MARGIN_M }
+}
+
 /// Squared sine of the angle below which segments count as parallel: then the lines are nearer than
 /// the ends by far less than any tolerance, and the nearest place is lost in rounding.
 const PARALLEL2: f64 = 1e-14;
@@ -237,7 +282,11 @@ impl<const D: usize> ConvexCore<D> {
                         && is_far_from_segment(q, [*a, *b], reach_m)
                         && !segments_cross([p, q], [*a, *b])
             }
-            _ => self.nearest_to_segment([p, q]).distance_m >= reach_m,
+            Self::Segment(core) => {
+                are_segments_surely_apart([p, q], *core, reach_m)
+                    || distance_of_segments_m([p, q], *core) >= reach_m
+            }
+            Self::Cuboid(_) => self.nearest_to_segment([p, q]).distance_m >= reach_m,
         }
     }
 
@@ -426,8 +475,39 @@ mod tests {
             prop_assert!(nearest.distance_m >= sampled - 5e-3);
             let apart_m = distance(nearest.on_body, nearest.on_core);
             prop_assert!((apart_m - nearest.distance_m).abs() < 1e-7);
+            prop_assert_eq!(distance_of_segments_m([p, q], [a, b]), nearest.distance_m);
             let back = between_segments([a, b], [p, q]);
             prop_assert!((back.distance_m - nearest.distance_m).abs() < 1e-12);
+        }
+
+        #[test]
+        fn segments_that_are_surely_apart_are_apart(
+            p in point::<3>(), d in point::<3>(), a in point::<3>(), e in point::<3>(),
+            reach_m in 0.0..2.0f64, length in -3.0..0.0f64, is_flat in any::<bool>(),
+        ) {
+            fn check<const D: usize>(
+                [p, d, a, e]: [Point<D>; 4], length: f64, reach_m: f64,
+            ) -> Result<(), TestCaseError> {
+                let length = math::exp(length * std::f64::consts::LN_10);
+                let one = [p, add_scaled(p, d, length)];
+                let other = [a, add_scaled(a, e, length)];
+                let apart_m = between_segments(one, other).distance_m;
+                if are_segments_surely_apart(one, other, reach_m) {
+                    prop_assert!(apart_m > reach_m);
+                }
+                prop_assert!(apart_m > bound_of_segments_m(one, other));
+                // Short rods far away are the usual case, in which the bound must suffice.
+                if apart_m > reach_m + 3.0 * length * (norm(d) + norm(e)) {
+                    prop_assert!(are_segments_surely_apart(one, other, reach_m));
+                }
+                Ok(())
+            }
+            let all = [p, d, a, e];
+            if is_flat {
+                check::<2>(all.map(convert_dimensions), length, reach_m)?;
+            } else {
+                check(all, length, reach_m)?;
+            }
         }
 
         #[test]
@@ -483,6 +563,7 @@ mod tests {
             let sampled = sampled_distance([p, q], &core);
             prop_assert!(nearest.distance_m <= sampled + 1e-12);
             prop_assert!(nearest.distance_m >= sampled - 5e-3);
+            prop_assert_eq!(distance_of_segments_m([p, q], [a, b]), nearest.distance_m);
             let clear = core.is_clear_of_segment([p, q], reach_m);
             prop_assert!(clear == (nearest.distance_m >= reach_m));
         }
@@ -513,6 +594,12 @@ mod tests {
             prop_assert!(nearest.distance_m <= sampled + 1e-9);
             prop_assert!(nearest.distance_m >= sampled - 5e-3);
         }
+    }
+
+    #[test]
+    fn points_at_one_place_are_never_surely_apart() {
+        assert!(!are_segments_surely_apart([[1.0, 2.0]; 2], [[1.0, 2.0]; 2], 0.0));
+        assert_eq!(distance_of_segments_m([[1.0, 2.0]; 2], [[1.0, 2.0]; 2]), 0.0);
     }
 
     #[test]

@@ -14,7 +14,9 @@
 //! up would suffice if it were measured again.
 
 use super::chain::Chain;
-use super::geometry::{Aabb, Point, add, between_segments, distance, dot, norm, sub};
+use super::geometry::{
+    Aabb, Point, are_segments_surely_apart, distance_of_segments_m, dot, norm, sub,
+};
 use super::motion_context::contact_distance_m;
 use super::own_body::{ChainPart, part_pairs};
 use super::rod_bvh::RodBvh;
@@ -228,9 +230,10 @@ impl<const D: usize> SeparationBounds<D> {
         let is_apart = |one: ChainPart, other: ChainPart| {
             let Some(separation_m) = chain.min_separation_m(one, other) else { return true };
             let pair = RodPairSweep { one: part_sweep(one), other: part_sweep(other) };
-            between_segments(pair.one.to, pair.other.to).distance_m
-                >= contact_distance_m(separation_m)
-                && pair.is_clear(separation_m)
+            let contact_m = contact_distance_m(separation_m);
+            let is_apart_at_end = are_segments_surely_apart(pair.one.to, pair.other.to, contact_m)
+                || distance_of_segments_m(pair.one.to, pair.other.to) >= contact_m;
+            is_apart_at_end && pair.is_clear(separation_m)
         };
         let clears_right_angles = chain.clears_right_angles();
         let mut was_open = false;
@@ -294,7 +297,9 @@ impl<const D: usize> SeparationBounds<D> {
         let mut gap_m = search_m;
         self.rods.refresh(search_m + thickness_m, self.odometer_m, bounds);
         self.rods.visit_near(&near, search_m + thickness_m, self.odometer_m, |other| {
-            if other == rod || are_rods_surely_apart(ends(rod), ends(other), gap_m + thickness_m) {
+            if other == rod
+                || are_segments_surely_apart(ends(rod), ends(other), gap_m + thickness_m)
+            {
                 return;
             }
             for [one, other] in part_pairs(rod.min(other), rod.max(other), rods) {
@@ -351,16 +356,4 @@ fn block_rods(block: usize, rods: usize) -> Range<usize> {
 fn stretches(rods: usize) -> impl Iterator<Item = Range<usize>> {
     let last = rods.saturating_sub(BLOCK).div_ceil(STRIDE).max(1);
     (0..last).map(move |k| STRIDE * k..(STRIDE * k + STRETCH).min(rods))
-}
-
-/// Returns whether two rods are surely as far from each other as `clearance_m`, less half of the margin:
-/// by the distance of their middles, which is much cheaper than that of the segments.
-#[inline]
-fn are_rods_surely_apart<const D: usize>(
-    [a, b]: [Point<D>; 2],
-    [c, d]: [Point<D>; 2],
-    clearance_m: f64,
-) -> bool {
-    let middles_m = 0.5 * distance(add(a, b), add(c, d));
-    middles_m - 0.5 * (distance(a, b) + distance(c, d)) >= clearance_m + 0.5 * MARGIN_M
 }

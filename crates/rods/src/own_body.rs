@@ -9,7 +9,7 @@
 //!   meet even where the chain is straight; then they keep the distance that they have there.
 
 use super::chain::{Chain, SKIN_M};
-use super::geometry::{Aabb, Point, between_segments, distance};
+use super::geometry::{Aabb, Point, distance, distance_of_segments_m};
 use super::rod_bvh::RodBvh;
 use super::sweep::{RodPairSweep, RodSweep};
 use std::fmt::{self, Display, Formatter};
@@ -123,8 +123,7 @@ impl<const D: usize> Chain<D> {
     /// none if they share a joint.
     pub fn own_gap_m(&self, points: &[Point<D>], [one, other]: [ChainPart; 2]) -> Option<f64> {
         let separation_m = self.min_separation_m(one, other)?;
-        let nearest = between_segments(one.ends(points), other.ends(points));
-        Some(nearest.distance_m - separation_m)
+        Some(distance_of_segments_m(one.ends(points), other.ends(points)) - separation_m)
     }
 
     /// Returns the box around a rod and the connectors at its ends, which are at `ends`, grown by `by_m`.

@@ -8,8 +8,8 @@
 //! guarantees of that and their limits.
 
 use super::geometry::{
-    ConvexCore, Point, add, add_scaled, between_segments, cross_2d, dot, lerp, norm, scaled,
-    segments_cross, sub,
+    ConvexCore, Point, add, add_scaled, are_segments_surely_apart, cross_2d,
+    distance_of_segments_m, dot, lerp, norm, scaled, segments_cross, sub,
 };
 
 /// A moving rod: master and slave, before and after.
@@ -129,6 +129,14 @@ impl<const D: usize> RodPairSweep<D> {
     /// too near can get apart; only where their core lines cross at the start, every way is allowed.
     pub(super) fn is_clear(&self, separation_m: f64) -> bool {
         let travel_m = self.max_approach_m();
+        // The usual case: what is asked for below of the sum of both distances, each of them has a half of. The distance
+        // kept is this one, or less.
+        let enough_m = KEPT_FRACTION * separation_m + TOUCH_M + 0.5 * travel_m;
+        if are_segments_surely_apart(self.one.from, self.other.from, enough_m)
+            && are_segments_surely_apart(self.one.to, self.other.to, enough_m)
+        {
+            return true;
+        }
         let start_m = self.distance_m(0.0);
         if start_m < TOUCH_M {
             return true;
@@ -157,7 +165,7 @@ impl<const D: usize> RodPairSweep<D> {
     fn distance_m(&self, time: f64) -> f64 {
         let [one, other] = [&self.one, &self.other]
             .map(|sweep| [0, 1].map(|end| lerp(sweep.from[end], sweep.to[end], time)));
-        between_segments(one, other).distance_m
+        distance_of_segments_m(one, other)
     }
 
     /// Returns a bound on the distance by which the parts approach each other, meters. What both move alike does not

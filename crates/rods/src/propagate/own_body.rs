@@ -3,7 +3,7 @@
 
 use super::{ConnectorVeto, PropagationContext, Propagator};
 use crate::chain::Chain;
-use crate::geometry::between_segments;
+use crate::geometry::distance_of_segments_m;
 use crate::motion_context::{IncompleteVeto, MotionContext, contact_distance_m};
 use crate::own_body::{ChainPart, ChainSweep, ROUNDING_M};
 use crate::pass::ChainDirection;
@@ -74,12 +74,12 @@ impl<const D: usize> MotionContext<'_, D> {
         let Some(separation_m) = self.chain.min_separation_m(one, other) else { return true };
         let ends_now =
             |part: ChainPart| [part.connector(), part.last_connector()].map(|k| self.position(k));
-        let now_m = between_segments(ends_now(one), ends_now(other)).distance_m;
+        let now_m = distance_of_segments_m(ends_now(one), ends_now(other));
         if now_m >= contact_distance_m(separation_m) {
             return true;
         }
         let points = self.chain.points();
-        now_m >= between_segments(one.ends(points), other.ends(points)).distance_m - ROUNDING_M
+        now_m >= distance_of_segments_m(one.ends(points), other.ends(points)) - ROUNDING_M
     }
 }
 

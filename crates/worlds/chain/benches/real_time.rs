@@ -53,7 +53,9 @@ fn main() {
         std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let repeats = arguments.get(1).map_or(3, |n| n.parse().expect("REPEATS is a number"));
     let clock = SystemClock::default();
-    println!("seed | processor time / simulated time: of the slowest 100 cycles, their first; of the run");
+    println!(
+        "seed | processor time / simulated time: of the slowest 100 cycles, their first; of the run"
+    );
     let mut worst = 0.0_f64;
     for seed in seeds(arguments.first().map(String::as_str)) {
         let mut best_s = cycle_times_s(seed, &clock);

@@ -4,7 +4,7 @@ use super::Initiator;
 use super::desired_move::DesiredMove;
 use super::situation::has_held_connector;
 use crate::driver::Task;
-use crate::motion::escape::{LeadMotion, ObstacleEscaper};
+use crate::motion::escape::{LeadMotion, LeaderChoice, ObstacleEscaper};
 use crate::state::ChainBodyState;
 use sidestep_rods::geometry::{convert_dimensions, sub};
 use sidestep_rods::{Chain, RequestSource};
@@ -24,8 +24,13 @@ pub(super) fn should_yield<const D: usize>(
         None => body.escape_plan.set_resting(false),
         // By slot, so that not all chains make their rollouts in the same cycle.
         Some(lead) if (context.now + u64::from(context.slot)).is_multiple_of(every) => {
-            let rules = &context.world.rules;
-            let rests = escaper.should_leader_rest(&body.chain, context.obstacles, rules, &lead);
+            let choice = LeaderChoice {
+                chain: &body.chain,
+                obstacles: context.obstacles,
+                rules: &context.world.rules,
+                lead,
+            };
+            let rests = escaper.should_leader_rest(&choice, &mut body.escape_plan);
             body.escape_plan.set_resting(rests);
         }
         // Between two choices the last one holds.

@@ -22,10 +22,10 @@ use serde::Deserialize;
 use sidestep_kernel::InputError;
 pub(crate) use sidestep_rods::ChainPart;
 use sidestep_rods::geometry::{Point, norm};
-use sidestep_rods::{Chain, Obstacle, Obstacles, Propagator, ReactionRules, Veto};
+use sidestep_rods::{Chain, Obstacle, Obstacles, Propagator, Veto};
 pub use simultaneous::EscapePlan;
-pub(crate) use simultaneous::LeadMotion;
 use simultaneous::SimultaneousEscape;
+pub(crate) use simultaneous::{LeadMotion, LeaderChoice};
 
 /// The method by which a chain escapes from moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
@@ -210,12 +210,10 @@ impl<const D: usize> ObstacleEscaper<D> {
     /// chain inside moving obstacles for less time.
     pub(crate) fn should_leader_rest(
         &self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
-        rules: &ReactionRules,
-        lead: &LeadMotion<D>,
+        choice: &LeaderChoice<'_, D>,
+        escape_plan: &mut EscapePlan,
     ) -> bool {
-        self.simultaneous.should_leader_rest(chain, obstacles, rules, lead)
+        self.simultaneous.should_leader_rest(choice, escape_plan)
     }
 
     /// Moves the parts of a chain that are too near to a moving obstacle. `escape_plan` is the chain's memory: the

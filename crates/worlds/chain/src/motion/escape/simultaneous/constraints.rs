@@ -65,8 +65,10 @@ impl<const D: usize> EscapeConstraintChecker<'_, '_, D> {
             && self.are_travels_met()
             && bends.iter().all(|bend| bend.is_met(self.points))
             && contacts.pairs.iter().all(|pair| {
-                nearest_points(self.points, pair.parts).distance_m >= pair.keep_m - TOLERANCE_M
-                    && is_own_path_clear(chain, [chain.points(), self.points], pair.parts)
+                let contact_m = pair.keep_m - TOLERANCE_M;
+                let is_apart = pair.is_surely_apart(self.points, contact_m)
+                    || nearest_points(self.points, pair.parts).distance_m >= contact_m;
+                is_apart && is_own_path_clear(chain, [chain.points(), self.points], pair.parts)
             })
             && contacts.walls.iter().all(|wall| {
                 let to = ends(self.points, wall.part);

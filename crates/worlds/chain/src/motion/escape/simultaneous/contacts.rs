@@ -3,7 +3,10 @@
 use super::super::EscapeMargin;
 use super::super::threat::{Threat, collect_threats};
 use super::posture::ends;
-use sidestep_rods::geometry::{Aabb, ConvexCore, NearestPoints, Point, between_segments, distance};
+use sidestep_rods::geometry::{
+    Aabb, ConvexCore, NearestPoints, Point, are_segments_surely_apart, between_segments,
+    bound_of_segments_m, distance, distance_of_segments_m,
+};
 use sidestep_rods::{Chain, ChainPart, Obstacles, RodBvh, part_pairs};
 
 /// A part near an obstacle that stands still.
@@ -13,6 +16,8 @@ pub(super) struct WallContact<const D: usize> {
     pub(super) core: ConvexCore<D>,
     /// Distance from the core to be kept, meters: that of touching, or less if it was less.
     pub(super) keep_m: f64,
+    /// The odometer's reading below which it surely keeps more, meters.
+    pub(super) clear_until_m: f64,
 }
 
 /// Two parts of the chain near each other.
@@ -21,6 +26,8 @@ pub(super) struct PartPair {
     pub(super) parts: [ChainPart; 2],
     /// Distance to be kept, meters: that of touching, or less if it was less.
     pub(super) keep_m: f64,
+    /// The odometer's reading below which they surely keep more, meters.
+    pub(super) clear_until_m: f64,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -30,6 +37,23 @@ pub(super) struct Contacts<const D: usize> {
     pub(super) walls: Vec<WallContact<D>>,
     pub(super) pairs: Vec<PartPair>,
     body: RodBvh<D>,
+}
+
+impl PartPair {
+    /// Returns whether the parts are surely farther from each other than `keep_m`. Most pairs are in most rounds, and this
+    /// takes much less time than their distance.
+    #[inline]
+    pub(super) fn is_surely_apart<const D: usize>(&self, points: &[Point<D>], keep_m: f64) -> bool {
+        let one = ends(points, self.parts[0]);
+        let other = ends(points, self.parts[1]);
+        are_segments_surely_apart(one, other, keep_m)
+    }
+
+    /// Returns a distance that the parts surely have at least, meters.
+    #[inline]
+    pub(super) fn bound_m<const D: usize>(&self, points: &[Point<D>]) -> f64 {
+        bound_of_segments_m(ends(points, self.parts[0]), ends(points, self.parts[1]))
+    }
 }
 
 impl<const D: usize> Contacts<D> {
@@ -73,6 +97,7 @@ impl<const D: usize> Contacts<D> {
                         part,
                         core: o.core,
                         keep_m: touch_m.min(apart_m),
+                        clear_until_m: f64::NEG_INFINITY,
                     });
                 }
             });
@@ -121,9 +146,18 @@ fn near_pair<const D: usize>(
     parts: [ChainPart; 2],
     reach_m: f64,
 ) -> Option<PartPair> {
-    let apart_m = nearest_points(chain.points(), parts).distance_m;
+    let one = ends(chain.points(), parts[0]);
+    let other = ends(chain.points(), parts[1]);
     let touch_m = chain.min_separation_m(parts[0], parts[1])?;
-    (apart_m < touch_m + reach_m).then(|| PartPair { parts, keep_m: touch_m.min(apart_m) })
+    if are_segments_surely_apart(one, other, touch_m + reach_m) {
+        return None;
+    }
+    let apart_m = distance_of_segments_m(one, other);
+    (apart_m < touch_m + reach_m).then(|| PartPair {
+        parts,
+        keep_m: touch_m.min(apart_m),
+        clear_until_m: f64::NEG_INFINITY,
+    })
 }
 
 pub(super) fn nearest_points<const D: usize>(

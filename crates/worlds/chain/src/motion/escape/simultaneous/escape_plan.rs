@@ -6,11 +6,14 @@
 //! with obstacles at constant velocity, and the one with the least time inside is taken.
 
 use super::super::ObstacleEscapeRules;
-use super::super::threat::gap_m;
+use super::TOUCH_M;
+use super::endangered::{EndangeredConnector, endangered_connectors, group_to_save};
+use super::exit_search::ExitSearch;
 use super::posture::ends;
-use super::rollout::{IMPROVEMENT_FACTOR, MIN_BENEFIT_TICKS, Rollout, RolloutOptions};
+use super::rollout::Rollout;
 use super::solve::{EscapeSolver, direction_away};
 use super::solve_input::{EscapeSolveInput, ExitDirection};
+use super::work::WorkReserve;
 use serde::{Deserialize, Serialize};
 use sidestep_kernel::math::{cos, sin};
 use sidestep_rods::geometry::{
@@ -25,6 +28,9 @@ pub struct EscapePlan {
     passing: Option<ActiveExit>,
     /// Ticks until the next search for an exit.
     pause: u32,
+    search: ExitSearch,
+    /// The work that rollouts may take.
+    pub(super) reserve: WorkReserve,
     /// Whether its leader rests.
     rests: bool,
 }
@@ -40,9 +46,10 @@ const CHOICE_INTERVAL_TICKS: u32 = 4;
 /// Gap below which a chain is in danger and an exit is searched for, meters: more than the margin of 0.05 m, so that
 /// the search begins while tongs still close. An exit ends at a wider gap, so that it does not end and begin by turns.
 const DANGER_DISTANCE_M: f64 = 0.12;
-/// Limit on the work of a choice: ticks of rollouts times connectors in them. It suffices for some 25 whole rollouts of 26
-/// connectors; most end early.
-const MAX_WORK: usize = 100_000;
+/// Ticks from one choice to the next while rollouts foresee no contact.
+const SAFE_INTERVAL_TICKS: u32 = 3 * CHOICE_INTERVAL_TICKS;
+/// Least reserve of work with which a choice begins: that of a few whole rollouts of 26 connectors.
+const CHOICE_WORK: u64 = 600_000;
 /// Connectors to either side of those in contact that rollouts include: those farther away hardly move while a part leaves
 /// an obstacle.
 const SIDE_CONNECTORS: usize = 12;
@@ -69,11 +76,18 @@ impl EscapePlan {
 
     /// Forgets the exit of a chain with no obstacle near.
     pub(super) fn reset_exit(&mut self) {
-        *self = Self { rests: self.rests, ..Self::default() };
+        *self = Self { rests: self.rests, reserve: self.reserve, ..Self::default() };
     }
 
-    pub(super) fn count_down_pause(&mut self) {
+    /// Forgets the search for an exit of a chain that is in no danger.
+    pub(super) fn reset_search(&mut self) {
+        self.search = ExitSearch::default();
+    }
+
+    /// Counts a tick of `dt_s`.
+    pub(super) fn start_tick(&mut self, dt_s: f64) {
         self.pause = self.pause.saturating_sub(1);
+        self.reserve.refill(dt_s);
     }
 
     pub(super) fn exit_direction<const D: usize>(&self) -> Option<ExitDirection<D>> {
@@ -100,58 +114,50 @@ impl EscapePlan {
         solver: &EscapeSolver<D>,
         gap_m: f64,
     ) -> bool {
-        if self.pause > 0 || gap_m > DANGER_DISTANCE_M {
+        if gap_m > DANGER_DISTANCE_M {
+            self.reset_search();
+            return false;
+        }
+        // Contact that was not foreseen is seen to at once.
+        let is_surprised = gap_m < -TOUCH_M && self.search.foresees_no_contact();
+        if (self.pause > 0 && !is_surprised) || self.reserve.left() < CHOICE_WORK {
             return false;
         }
         self.pause = CHOICE_INTERVAL_TICKS;
-        let around = endangered_connectors(input, solver);
+        let now = self.exit_direction();
+        let endangered = endangered_connectors(input, solver);
+        let group = group_to_save(&endangered, now.map(|exit| exit.obstacle));
+        let around = rolled_out_connectors(group, input.chain.points().len());
         let Some(rollout) = Rollout::from_connector_range(rules, input, around) else {
             return false;
         };
-        let now = self.exit_direction();
-        let mut left = rollout.affordable_ticks(MAX_WORK);
-        let cost_now = rollout.cost(&RolloutOptions::with_exit(now), f64::INFINITY, &mut left);
-        // Another exit must be clearly better, or the chain would alternate between two and leave by neither.
-        let mut best = (IMPROVEMENT_FACTOR * cost_now - MIN_BENEFIT_TICKS, now);
-        for exit in
-            std::iter::once(None).chain(exit_candidates(input, solver).into_iter().map(Some))
-        {
-            if left == 0 {
-                break;
-            }
-            let cost = rollout.cost(&RolloutOptions::with_exit(exit), best.0, &mut left);
-            if cost < best.0 {
-                best = (cost, exit);
-            }
+        let candidates = || exit_candidates(input, group);
+        let best = self.search.find_exit(&rollout, now, candidates, &mut self.reserve);
+        if self.search.foresees_no_contact() {
+            self.pause = SAFE_INTERVAL_TICKS;
         }
-        self.passing = best.1.map(|exit| ActiveExit {
+        self.passing = best.map(|exit| ActiveExit {
             obstacle: exit.obstacle,
             toward: convert_dimensions(exit.toward),
         });
-        best.1 != now
+        best != now
     }
 }
 
-/// Returns the exits through the obstacles that touch the chain.
+/// Returns the exits through the obstacles near a group of connectors.
 fn exit_candidates<const D: usize>(
     input: &EscapeSolveInput<'_, D>,
-    solver: &EscapeSolver<D>,
+    group: &[EndangeredConnector],
 ) -> Vec<ExitDirection<D>> {
     let mut exits = Vec::new();
-    let threats = &solver.contacts.threats;
-    for (k, mover) in input.obstacles.moving().iter().enumerate() {
-        let near = threats.iter().filter(|t| t.mover == k);
-        let gaps = near.map(|t| (gap_m(input.chain, t.part, mover), t.part));
-        let Some((gap_m, part)) = gaps.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
-        // Twice as far as danger begins: an obstacle that is not in contact yet may be the better
-        // exit.
-        if gap_m < 2.0 * DANGER_DISTANCE_M {
-            let nearest = mover.core.nearest_to_segment(ends(input.chain.points(), part));
-            let through = scaled(direction_away(mover, &nearest), -1.0);
-            let obstacle = mover.id;
-            let directions = exit_directions(through, mover.velocity_m_s).into_iter();
-            exits.push(directions.map(move |toward| ExitDirection { obstacle, toward }));
-        }
+    for mover in input.obstacles.moving() {
+        let near = group.iter().filter(|endangered| endangered.obstacle == mover.id);
+        let Some(nearest) = near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)) else { continue };
+        let nearest = mover.core.nearest_to_segment(ends(input.chain.points(), nearest.part));
+        let through = scaled(direction_away(mover, &nearest), -1.0);
+        let obstacle = mover.id;
+        let directions = exit_directions(through, mover.velocity_m_s).into_iter();
+        exits.push(directions.map(move |toward| ExitDirection { obstacle, toward }));
     }
     // In turn of each obstacle, because the limit on the work may end the search before the last candidate.
     let mut all = Vec::new();
@@ -185,25 +191,15 @@ fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) ->
     all
 }
 
-/// Returns the connectors of the chain around those in danger.
-fn endangered_connectors<const D: usize>(
-    input: &EscapeSolveInput<'_, D>,
-    solver: &EscapeSolver<D>,
+/// Returns the connectors that rollouts include to save some: also those to either side.
+fn rolled_out_connectors(
+    group: &[EndangeredConnector],
+    connectors: usize,
 ) -> RangeInclusive<usize> {
-    let EscapeSolveInput { chain, obstacles, .. } = *input;
-    let mut from = usize::MAX;
-    let mut to = 0;
-    for threat in &solver.contacts.threats {
-        let mover = &obstacles.moving()[threat.mover];
-        if gap_m(chain, threat.part, mover) < 2.0 * DANGER_DISTANCE_M {
-            let k = threat.part.connector();
-            from = from.min(k);
-            to = to.max(k);
-        }
-    }
-    let last = chain.points().len() - 1;
-    // The minimum of the two is 0 if no part is in danger.
-    from.min(to).saturating_sub(SIDE_CONNECTORS)..=(to + 1 + SIDE_CONNECTORS).min(last)
+    // Without any in danger the chain's start stands for it.
+    let from = group.first().map_or(0, |endangered| endangered.k);
+    let to = group.last().map_or(0, |endangered| endangered.k);
+    from.saturating_sub(SIDE_CONNECTORS)..=(to + 1 + SIDE_CONNECTORS).min(connectors - 1)
 }
 
 #[cfg(test)]

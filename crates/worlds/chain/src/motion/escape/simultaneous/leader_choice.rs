@@ -7,15 +7,16 @@
 //! steps among 8 discs), because leaders that turn to and fro get nowhere.
 
 use super::super::ObstacleEscapeRules;
+use super::escape_plan::EscapePlan;
 use super::rollout::{IMPROVEMENT_FACTOR, MIN_BENEFIT_TICKS, Rollout, RolloutOptions};
 use super::solve_input::{EscapeSolveInput, LeadMotion};
 
 /// Connectors to either side of the leader that rollouts include: many more than for an exit, because the leader pulls
 /// those far behind it between obstacles, too.
 const SIDE_CONNECTORS: usize = 48;
-/// Limit on the work of a choice: ticks of rollouts times connectors in them. It suffices for two whole rollouts, of 150
-/// ticks each, with all 97 connectors.
-const MAX_WORK: usize = 40_000;
+/// Least reserve of work with which a choice begins: that of a whole rollout of 97 connectors which are in contact half of
+/// the time. With less, the last choice holds.
+const CHOICE_WORK: u64 = 300_000;
 
 /// Resting is rolled out only where moving brings parts inside, because rollouts are all the cost
 /// of a choice.
@@ -23,19 +24,23 @@ pub(super) fn should_leader_rest<const D: usize>(
     rules: &ObstacleEscapeRules,
     input: &EscapeSolveInput<'_, D>,
     lead: &LeadMotion<D>,
+    escape_plan: &mut EscapePlan,
 ) -> bool {
+    let mut left = escape_plan.reserve.left();
+    if left < CHOICE_WORK {
+        return escape_plan.is_resting();
+    }
     let from = lead.k.saturating_sub(SIDE_CONNECTORS);
     let to = (lead.k + SIDE_CONNECTORS).min(input.chain.points().len() - 1);
     let rollout =
         Rollout::from_connector_range(rules, input, from..=to).filter(Rollout::is_approached);
     let Some(rollout) = rollout else { return false };
-    let mut left = rollout.affordable_ticks(MAX_WORK);
     let wanted = LeadMotion { k: lead.k - from, displacement_m: lead.displacement_m };
     let rest = LeadMotion { displacement_m: [0.0; D], ..wanted };
     let wanted_cost = rollout.cost(&RolloutOptions::with_lead(wanted), f64::INFINITY, &mut left);
     let enough = IMPROVEMENT_FACTOR * wanted_cost - MIN_BENEFIT_TICKS;
-    if enough <= 0.0 {
-        return false;
-    }
-    rollout.cost(&RolloutOptions::with_lead(rest), enough, &mut left) < enough
+    let rests =
+        enough > 0.0 && rollout.cost(&RolloutOptions::with_lead(rest), enough, &mut left) < enough;
+    escape_plan.reserve.set_left(left);
+    rests
 }

@@ -17,6 +17,8 @@ pub(super) struct RodLengthProjector<const D: usize> {
     diagonal: Vec<f64>,
     side: Vec<f64>,
     beyond_m: Vec<f64>,
+    /// Corrections made so far.
+    pub(super) corrections: u64,
 }
 
 /// Fraction of a rod's play that is left free at either limit, so that rounding does not carry a rod beyond it.
@@ -45,6 +47,7 @@ impl<const D: usize> RodLengthProjector<D> {
 
     /// Makes one correction of all lengths; returns the greatest error before it, meters.
     pub(super) fn correct(&mut self, posture: &mut TrialPosture<'_, D>, rods: &[Rod]) -> f64 {
+        self.corrections += 1;
         let worst_m = self.measure(posture, rods);
         if worst_m > ERROR_TOLERANCE_M {
             self.assemble_equations(posture);

@@ -1,8 +1,9 @@
 //! Escape by a simultaneous solve of all constraints of a tick.
 //!
 //! ```text
-//! solve.rs          new positions of all parts: contacts.rs, lengths.rs, and the hard constraints.rs
-//! escape_plan.rs    exits for parts that are caught: rollouts of motions through an obstacle
+//! solve.rs          new positions of all parts: contacts.rs, lengths.rs, odometer.rs, and the hard constraints.rs
+//! escape_plan.rs    exits for parts that are caught (endangered.rs), of which exit_search.rs finds the shortest
+//! work.rs           the work that rollouts may take
 //! leader_choice.rs  the leader's choice before any part is caught: rollouts of its motion and of resting
 //! rollout.rs        copies of a part of the chain on which motions are tried
 //! posture.rs        positions under trial
@@ -15,9 +16,12 @@
 
 mod constraints;
 mod contacts;
+mod endangered;
 mod escape_plan;
+mod exit_search;
 mod leader_choice;
 mod lengths;
+mod odometer;
 #[cfg(test)]
 mod pinch;
 mod posture;
@@ -26,16 +30,17 @@ mod solve;
 mod solve_input;
 #[cfg(test)]
 mod tests;
+mod work;
 
 use super::threat::Threat;
 use super::{EscapeMargin, EscapeReport, ObstacleEscapeInput, ObstacleEscapeRules, TrappedPart};
 pub use escape_plan::EscapePlan;
 use leader_choice::should_leader_rest;
 use sidestep_rods::geometry::{Point, distance};
-use sidestep_rods::{Chain, Obstacles, ReactionRules, Veto, VetoReason};
+use sidestep_rods::{Veto, VetoReason};
 use solve::EscapeSolver;
-pub(crate) use solve_input::LeadMotion;
 use solve_input::{EscapeSolveInput, ExitDirection, SoftConstraints};
+pub(crate) use solve_input::{LeadMotion, LeaderChoice};
 
 /// Escapes of all parts of a chain at once. It owns its buffers.
 #[derive(Debug, Clone)]
@@ -74,7 +79,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         let max_step_m = self.rules.max_step_m().min(MAX_STEPS * thinnest_m);
         let steps = (max_step_m / thinnest_m).ceil().max(1.0);
         let mut report = EscapeReport::default();
-        escape_plan.count_down_pause();
+        escape_plan.start_tick(self.rules.dt_s);
         for step in 1..=steps as usize {
             let max_step_m = max_step_m * step as f64 / steps;
             // Taken out, because the solve borrows the start and changes everything else.
@@ -103,14 +108,13 @@ impl<const D: usize> SimultaneousEscape<D> {
     /// Tries both on copies; the chain stays as it is.
     pub(super) fn should_leader_rest(
         &self,
-        chain: &Chain<D>,
-        obstacles: &Obstacles<D>,
-        rules: &ReactionRules,
-        lead: &LeadMotion<D>,
+        choice: &LeaderChoice<'_, D>,
+        escape_plan: &mut EscapePlan,
     ) -> bool {
+        let LeaderChoice { chain, obstacles, rules, lead } = *choice;
         let max_step_m = self.rules.max_step_m();
         let input = EscapeSolveInput { chain, obstacles, rules, start: chain.points(), max_step_m };
-        should_leader_rest(&self.rules, &input, lead)
+        should_leader_rest(&self.rules, &input, &lead, escape_plan)
     }
 
     /// Finds the positions of one step, in `best`; returns whether any part moves.
@@ -128,6 +132,7 @@ impl<const D: usize> SimultaneousEscape<D> {
         escape_plan.clear_if_passed(input, &self.solver);
         let (before_m, nearest) = self.solver.min_gap(input, input.chain.points());
         if before_m >= margin_around(input, margin, nearest) && !escape_plan.is_exiting() {
+            escape_plan.reset_search();
             return false;
         }
         let mut gap_m = self.attempt(input, escape_plan.exit_direction(), before_m);

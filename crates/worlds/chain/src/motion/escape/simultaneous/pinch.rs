@@ -5,7 +5,7 @@ use crate::fixtures::{TestRng, clearance_m};
 use crate::scenario::ChainScenario;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::math::{cos, sin};
-use sidestep_rods::Obstacle;
+use sidestep_rods::{Chain, Obstacle};
 use sidestep_scenario::Source;
 use sidestep_testing::root;
 use std::collections::VecDeque;

@@ -43,6 +43,8 @@ const MAX_TICKS: usize = 150;
 const CLEAR_TICKS: usize = 75;
 /// Cost of depth, in ticks per meter and tick: it only decides between exits that take as long.
 const DEPTH_COST: f64 = 0.2;
+/// Work of a tick beside its solve, in corrections: obstacles that advance, and the search for contacts.
+const TICK_CORRECTIONS: u64 = 8;
 /// Rounds of a solve in a rollout, with margins and without; fewer than in a tick, because rollouts are many.
 const ROUNDS: [usize; 2] = [12, 20];
 
@@ -133,14 +135,9 @@ impl<'a, const D: usize> Rollout<'a, D> {
         self.obstacles.moving().iter().any(Obstacle::is_moving)
     }
 
-    /// Returns the ticks of rollouts that an amount of work allows, in ticks times connectors.
-    pub(super) fn affordable_ticks(&self, work: usize) -> usize {
-        work / self.chain.points().len()
-    }
-
     /// Returns the time inside by some motions, ticks, with a surcharge for depth; it may end early at
-    /// `enough`, or when no tick is `left`.
-    pub(super) fn cost(&self, tried: &RolloutOptions<D>, enough: f64, left: &mut usize) -> f64 {
+    /// `enough`. If no work is `left`, it is infinite.
+    pub(super) fn cost(&self, tried: &RolloutOptions<D>, enough: f64, left: &mut u64) -> f64 {
         let mut trial = self.start_trial();
         let RolloutOptions { mut through, lead, clear: clear_ticks } = *tried;
         let mut cost = 0.0;
@@ -155,9 +152,11 @@ impl<'a, const D: usize> Rollout<'a, D> {
             if *left == 0 {
                 return f64::INFINITY;
             }
-            *left -= 1;
+            let corrections_before = trial.solver.corrections();
             let start = trial.chain.points().to_vec();
             let gap_m = self.escape(&mut trial, &start, &mut through);
+            let corrections = TICK_CORRECTIONS + trial.solver.corrections() - corrections_before;
+            *left = left.saturating_sub(corrections * start.len() as u64);
             clear = if gap_m < -TOUCH_M { 0 } else { clear + 1 };
             if clear == 0 {
                 cost += 1.0 - DEPTH_COST * gap_m;

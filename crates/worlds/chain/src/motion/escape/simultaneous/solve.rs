@@ -9,6 +9,7 @@ use super::super::threat::{Threat, gap_m, leftward_direction};
 use super::constraints::{BendConstraint, EscapeConstraintChecker};
 use super::contacts::{Contacts, fraction_along, nearest_points};
 use super::lengths::RodLengthProjector;
+use super::odometer::Odometer;
 use super::posture::{PartPoint, TrialPosture, ends};
 use super::solve_input::{EscapeSolveInput, ExitDirection, SoftConstraints};
 use sidestep_rods::geometry::{
@@ -26,6 +27,7 @@ pub(super) struct EscapeSolver<const D: usize> {
     inverse_mass: Vec<f64>,
     bends: Vec<BendConstraint>,
     lengths: RodLengthProjector<D>,
+    odometer: Odometer<D>,
 }
 
 /// Distance around an obstacle in which the chain joins an exit through it, as a multiple of its
@@ -49,6 +51,8 @@ const MAX_SLACK_M: f64 = 1e-4;
 const SLACK_FRACTION: f64 = 0.01;
 /// Correction below which all is settled, meters.
 const SETTLE_TOLERANCE_M: f64 = 1e-6;
+/// Rounding of distances, meters.
+const ROUNDING_M: f64 = 1e-9;
 /// Fraction of its longest motion that a connector leaves free for the last corrections, of rods above all: they come
 /// after the limit of speed, and would exceed it.
 const RESERVE_FRACTION: f64 = 1e-4;
@@ -66,6 +70,7 @@ impl<const D: usize> EscapeSolver<D> {
             return false;
         }
         self.contacts.find_nearby(chain, obstacles, rules.self_collision, max_step_m);
+        self.odometer.start(chain.points());
         self.inverse_mass.clear();
         let connectors = chain.connectors().iter();
         self.inverse_mass.extend(connectors.map(|c| if c.is_still() { 0.0 } else { 1.0 }));
@@ -157,23 +162,40 @@ impl<const D: usize> EscapeSolver<D> {
     /// Pushes parts out of walls and apart, and corrects bends; returns the greatest correction,
     /// meters.
     fn push_from_walls(&mut self) -> f64 {
-        let Self { contacts, points, inverse_mass, bends, .. } = self;
+        let Self { contacts, points, inverse_mass, bends, odometer, .. } = self;
         let mut posture = trial_posture(points, inverse_mass);
         let mut greatest_m = 0.0_f64;
-        for wall in &contacts.walls {
+        odometer.advance_to(posture.points);
+        for wall in &mut contacts.walls {
+            if odometer.reading_m() < wall.clear_until_m {
+                continue;
+            }
             let ends = posture.ends(wall.part);
             let nearest = wall.core.nearest_to_segment(ends);
             let short_m = wall.keep_m + extra_clearance_m(wall.keep_m) - nearest.distance_m;
-            let Some(away) = normalized(sub(nearest.on_body, nearest.on_core)) else { continue };
-            if short_m > 0.0 {
-                let along_rod = fraction_along(ends, nearest.on_body);
-                posture.shift(wall.part, along_rod, scaled(away, short_m));
-                greatest_m = greatest_m.max(short_m);
+            if short_m <= 0.0 {
+                wall.clear_until_m = odometer.reading_m() - short_m - ROUNDING_M;
+                continue;
             }
+            let Some(away) = normalized(sub(nearest.on_body, nearest.on_core)) else { continue };
+            let along_rod = fraction_along(ends, nearest.on_body);
+            posture.shift(wall.part, along_rod, scaled(away, short_m));
+            odometer.advance_part(posture.points, wall.part);
+            greatest_m = greatest_m.max(short_m);
         }
-        for pair in &contacts.pairs {
+        for pair in &mut contacts.pairs {
+            if odometer.reading_m() < pair.clear_until_m {
+                continue;
+            }
+            let keep_m = pair.keep_m + extra_clearance_m(pair.keep_m);
+            let spare_m = pair.bound_m(posture.points) - keep_m;
+            if spare_m > 0.0 {
+                // Either part may use up half of it.
+                pair.clear_until_m = odometer.reading_m() + 0.5 * spare_m;
+                continue;
+            }
             let nearest = nearest_points(posture.points, pair.parts);
-            let short_m = pair.keep_m + extra_clearance_m(pair.keep_m) - nearest.distance_m;
+            let short_m = keep_m - nearest.distance_m;
             if short_m > 0.0 {
                 let [one, other] = pair.parts;
                 let one = part_point(&posture, one, nearest.on_body);
@@ -181,6 +203,7 @@ impl<const D: usize> EscapeSolver<D> {
                 let away = normalized(sub(nearest.on_core, nearest.on_body))
                     .unwrap_or_else(|| perpendicular(unit_x()));
                 posture.separate(one, other, away, short_m);
+                pair.parts.into_iter().for_each(|part| odometer.advance_part(posture.points, part));
                 greatest_m = greatest_m.max(short_m);
             }
         }
@@ -220,6 +243,11 @@ impl<const D: usize> EscapeSolver<D> {
     fn meets_constraints(&self, input: &EscapeSolveInput<'_, D>) -> bool {
         let Self { contacts, points, bends, .. } = self;
         EscapeConstraintChecker { input, points }.are_met(contacts, bends)
+    }
+
+    /// Returns the corrections of all rods so far: most of the work of solves goes with them.
+    pub(super) fn corrections(&self) -> u64 {
+        self.lengths.corrections
     }
 
     /// Returns whether all parts are farther from an obstacle than it takes to have passed it.

@@ -31,6 +31,15 @@ pub(crate) struct LeadMotion<const D: usize> {
     pub(crate) displacement_m: Point<D>,
 }
 
+/// What a leader chooses by: its chain, what is around it, and the motion that it wants.
+#[derive(Clone, Copy)]
+pub(crate) struct LeaderChoice<'a, const D: usize> {
+    pub(crate) chain: &'a Chain<D>,
+    pub(crate) obstacles: &'a Obstacles<D>,
+    pub(crate) rules: &'a ReactionRules,
+    pub(crate) lead: LeadMotion<D>,
+}
+
 /// An exit through an obstacle: parts in it leave in one direction, even if another is shorter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ExitDirection<const D: usize> {

@@ -3,7 +3,9 @@ use super::*;
 use crate::fixtures::{TestRng, clearance_m};
 use proptest::prelude::*;
 use sidestep_rods::geometry::{ConvexCore, normalized, scaled, segments_cross};
-use sidestep_rods::{Connector, Mobility, Obstacle, Propagator, Rod};
+use sidestep_rods::{
+    Chain, Connector, Mobility, Obstacle, Obstacles, Propagator, ReactionRules, Rod,
+};
 
 const DT_S: f64 = 0.02;
 const SWARM: Rod = Rod { min_m: 0.6, max_m: 0.8, radius_m: 0.05 };
@@ -138,6 +140,57 @@ fn a_ball_that_crosses_the_chain_never_touches_it() {
         crosses::<2>(at_x);
         crosses::<3>(at_x);
     }
+}
+
+/// The tongs of the next test, at the first tick at which an exit is searched for.
+fn tongs() -> Case<2> {
+    let discs = vec![ball(1, [0.2, 0.85], [0.0, -0.5]), ball(2, [0.2, -0.85], [0.0, 0.5])];
+    Case::new(straight::<2>(14, SWARM, 0.25), discs, 1.0)
+}
+
+#[test]
+fn a_search_that_ends_for_want_of_work_is_carried_on_until_it_finds_an_exit() {
+    /// Finds the exit of the tongs with so much work a tick; returns it, and the ticks that it took.
+    fn find(work: u64) -> (Option<ExitDirection<2>>, usize) {
+        let Case { chain, obstacles, escaper, .. } = tongs();
+        let max_step_m = DT_S;
+        let start = chain.points();
+        let input = EscapeSolveInput {
+            chain: &chain,
+            obstacles: &obstacles,
+            rules: &SOLID,
+            start,
+            max_step_m,
+        };
+        let whole = 0..=chain.points().len() - 1;
+        let rollout =
+            rollout::Rollout::from_connector_range(escaper.rules(), &input, whole).unwrap();
+        let candidates = || {
+            let ways = (0..12).map(|turn| {
+                let turn_rad = std::f64::consts::TAU * f64::from(turn) / 12.0;
+                [sidestep_kernel::math::cos(turn_rad), sidestep_kernel::math::sin(turn_rad)]
+            });
+            ways.map(|toward| ExitDirection { obstacle: 1, toward }).collect()
+        };
+        let mut search = exit_search::ExitSearch::default();
+        let mut exit = None;
+        for tick in 1.. {
+            let mut reserve = work::WorkReserve::default();
+            reserve.set_left(work);
+            exit = search.find_exit(&rollout, exit, candidates, &mut reserve);
+            assert!(reserve.left() < work);
+            if search.is_complete() {
+                return (exit, tick);
+            }
+        }
+        unreachable!("the search ends")
+    }
+    let (at_once, ticks) = find(2_000_000);
+    assert_eq!(ticks, 1);
+    assert!(at_once.is_some());
+    let (later, ticks) = find(200_000);
+    assert!(ticks > 2, "{ticks}");
+    assert!(later.is_some());
 }
 
 /// Two discs close on the middle of a chain from both sides, and go on through each other.

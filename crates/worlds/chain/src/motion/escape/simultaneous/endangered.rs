@@ -1,0 +1,104 @@
+//! The connectors in danger, in groups along the chain.
+
+use super::super::threat::gap_m;
+use super::solve::EscapeSolver;
+use super::solve_input::EscapeSolveInput;
+use sidestep_rods::ChainPart;
+
+/// Gap below which a connector or the rod at it counts as endangered, meters: twice as far as danger begins, because an
+/// obstacle that is not in contact yet may be the better exit.
+const ENDANGERED_DISTANCE_M: f64 = 0.24;
+/// Connectors between two groups at least: as many as rollouts include on both sides of one.
+const GROUP_DISTANCE: usize = 24;
+/// Connectors up to which several groups are rolled out together.
+const MAX_CONNECTORS: usize = 100;
+
+/// A connector near an obstacle, itself or by the rod behind it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct EndangeredConnector {
+    pub(super) k: usize,
+    /// The part that is near: the connector, or the rod.
+    pub(super) part: ChainPart,
+    /// Id of the obstacle.
+    pub(super) obstacle: u32,
+    pub(super) gap_m: f64,
+}
+
+/// Returns the endangered connectors in the order of the chain.
+pub(super) fn endangered_connectors<const D: usize>(
+    input: &EscapeSolveInput<'_, D>,
+    solver: &EscapeSolver<D>,
+) -> Vec<EndangeredConnector> {
+    let mut endangered = Vec::new();
+    for threat in &solver.contacts.threats {
+        let mover = &input.obstacles.moving()[threat.mover];
+        let gap_m = gap_m(input.chain, threat.part, mover);
+        if gap_m < ENDANGERED_DISTANCE_M {
+            let k = threat.part.connector();
+            endangered.push(EndangeredConnector {
+                k,
+                part: threat.part,
+                obstacle: mover.id,
+                gap_m,
+            });
+        }
+    }
+    endangered.sort_by_key(|endangered| (endangered.k, endangered.obstacle));
+    endangered
+}
+
+/// Returns the connectors that rollouts are to save. It is the group of the one that is nearest to an obstacle, because
+/// rollouts take time with each connector. A chain that is leaving through another obstacle, whose id is given, must not
+/// give that up for it: then all groups are, or if these are far apart the one at that obstacle.
+pub(super) fn group_to_save(
+    endangered: &[EndangeredConnector],
+    exit: Option<u32>,
+) -> &[EndangeredConnector] {
+    let are_near = |a: &EndangeredConnector, b: &EndangeredConnector| b.k - a.k <= GROUP_DISTANCE;
+    let groups = || endangered.chunk_by(are_near);
+    let least_gap_m = |group: &[EndangeredConnector]| {
+        group.iter().map(|endangered| endangered.gap_m).fold(f64::INFINITY, f64::min)
+    };
+    let nearest = groups().min_by(|a, b| least_gap_m(a).total_cmp(&least_gap_m(b)));
+    let Some(nearest) = nearest else { return endangered };
+    let Some(exit) = exit else { return nearest };
+    let is_at_exit =
+        |group: &&[EndangeredConnector]| group.iter().any(|endangered| endangered.obstacle == exit);
+    if is_at_exit(&nearest) {
+        return nearest;
+    }
+    let last = endangered.len() - 1;
+    if endangered[last].k - endangered[0].k < MAX_CONNECTORS {
+        return endangered;
+    }
+    groups().find(is_at_exit).unwrap_or(nearest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn group(from: usize, obstacle: u32, gap_m: f64) -> [EndangeredConnector; 2] {
+        [from, from + 20].map(|k| EndangeredConnector {
+            k,
+            part: ChainPart::Connector(k),
+            obstacle,
+            gap_m,
+        })
+    }
+
+    #[test]
+    fn the_group_nearest_to_an_obstacle_is_saved_unless_that_would_give_up_an_exit() {
+        let [low, middle, high] = [group(5, 1, 0.1), group(60, 2, 0.2), group(300, 3, 0.05)];
+        let all = [low, middle, high].concat();
+        assert_eq!(group_to_save(&all, None), high);
+        assert_eq!(group_to_save(&all, Some(3)), high);
+        // Too far apart for all.
+        assert_eq!(group_to_save(&all, Some(2)), middle);
+        assert_eq!(group_to_save(&all, Some(9)), high);
+        let near = [low, middle].concat();
+        assert_eq!(group_to_save(&near, None), low);
+        assert_eq!(group_to_save(&near, Some(2)), near);
+        assert_eq!(group_to_save(&[], None), []);
+    }
+}
