@@ -9,7 +9,7 @@
 //!   meet even where the chain is straight; then they keep the distance that they have there.
 
 use super::chain::{Chain, SKIN_M};
-use super::geometry::{Aabb, Point, distance, distance_of_segments_m};
+use super::geometry::{Aabb, Point, are_segments_surely_apart, distance, distance_of_segments_m};
 use super::rod_bvh::RodBvh;
 use super::sweep::{RodPairSweep, RodSweep};
 use std::fmt::{self, Display, Formatter};
@@ -204,7 +204,16 @@ fn visit_near_parts<const D: usize>(
                 return;
             }
             for parts in part_pairs(rod, other, rods) {
-                let Some(gap_m) = chain.own_gap_m(points, parts) else { continue };
+                let Some(separation_m) = chain.min_separation_m(parts[0], parts[1]) else {
+                    continue;
+                };
+                let one = parts[0].ends(points);
+                let other = parts[1].ends(points);
+                // Of most pairs in the boxes a bound says enough, which takes much less time than the distance.
+                if are_segments_surely_apart(one, other, separation_m + within_m) {
+                    continue;
+                }
+                let gap_m = distance_of_segments_m(one, other) - separation_m;
                 if gap_m < within_m {
                     within_m = visit(NearestOwnParts { parts: sorted(parts), gap_m });
                 }

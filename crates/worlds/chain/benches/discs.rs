@@ -296,7 +296,8 @@ fn print_discs(discs: usize, runs: u64) {
         for episode in &outcome.episodes {
             let state = started.state();
             let body = state.body(0);
-            let reference = Reference { chain: &body.chain, movers: &world.movers, dt_s: world.dt_s };
+            let reference =
+                Reference { chain: &body.chain, movers: &world.movers, dt_s: world.dt_s };
             let longest = reference.longest_inside(episode, seed);
             println!(
                 "       {} steps inside 2 s after cycle {}; the reference {longest}",

@@ -46,7 +46,7 @@ const CHOICE_INTERVAL_TICKS: u32 = 4;
 /// Gap below which a chain is in danger and an exit is searched for, meters: more than the margin of 0.05 m, so that
 /// the search begins while tongs still close. An exit ends at a wider gap, so that it does not end and begin by turns.
 const DANGER_DISTANCE_M: f64 = 0.12;
-/// Ticks from one choice to the next while rollouts foresee no contact.
+/// The same while rollouts foresee no contact, and little work is left for them.
 const SAFE_INTERVAL_TICKS: u32 = 3 * CHOICE_INTERVAL_TICKS;
 /// Least reserve of work with which a choice begins: that of a few whole rollouts of 26 connectors.
 const CHOICE_WORK: u64 = 600_000;
@@ -133,7 +133,7 @@ impl EscapePlan {
         };
         let candidates = || exit_candidates(input, group);
         let best = self.search.find_exit(&rollout, now, candidates, &mut self.reserve);
-        if self.search.foresees_no_contact() {
+        if self.search.foresees_no_contact() && self.reserve.is_low() {
             self.pause = SAFE_INTERVAL_TICKS;
         }
         self.passing = best.map(|exit| ActiveExit {

@@ -42,7 +42,7 @@ impl ExitSearch {
         if left == 0 {
             // A rollout that was cut off says nothing.
             self.foreseen = None;
-        } else if self.is_foreseen(cost_now) {
+        } else if reserve.is_low() && self.is_foreseen(cost_now) {
             self.foreseen = Some(cost_now);
         } else {
             // Another exit must be clearly better, or the chain would alternate between two and leave by neither.
@@ -73,7 +73,7 @@ impl ExitSearch {
     }
 
     /// Returns whether the present course costs no more than was foreseen when all candidates had been tried: while all
-    /// goes as foreseen, another search would find the same.
+    /// goes as foreseen, another search would find much the same.
     fn is_foreseen(&self, cost_now: f64) -> bool {
         self.next == 0 && self.foreseen.is_some_and(|cost| cost_now <= cost + MIN_BENEFIT_TICKS)
     }
