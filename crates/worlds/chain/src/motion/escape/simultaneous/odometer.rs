@@ -35,7 +35,7 @@ impl<const D: usize> Odometer<D> {
     /// Counts the moves of the connectors of one part.
     pub(super) fn advance_part(&mut self, points: &[Point<D>], part: ChainPart) {
         let mut farthest2 = 0.0_f64;
-        for k in part.connector()..=part.last_connector() {
+        for k in [part.connector(), part.last_connector()] {
             let by = sub(points[k], self.points[k]);
             farthest2 = farthest2.max(dot(by, by));
             self.points[k] = points[k];
