@@ -35,7 +35,7 @@ mod transform;
 
 pub use arm_selection::{ArmFiles, ArmModel};
 pub use bend::BendLimit;
-pub use body::{ArmBody, BodyContact, BodyPosture};
+pub use body::{ArmBody, BodyContact, BodyPathCheck, BodyPosture, BodyTravel};
 pub use inverse::{
     ArmBodyPart, ArmGoal, CollidesWith, Collision, FrameAxis, IkFailure, IkResult, IkSolution,
     MAX_SOLUTIONS, ObstacleSphere, OrientationMask, PoseMask,

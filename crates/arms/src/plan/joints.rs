@@ -3,11 +3,14 @@
 use super::{ConfigurationSpace, PlanningQuery};
 use crate::arm::Arm;
 use crate::ik::constraints::ConstraintChecker;
-use crate::kinematics::{ArmBody, ArmGoal, JointMotionKind};
+use crate::kinematics::{
+    ArmBody, ArmGoal, BodyContact, BodyPathCheck, BodyTravel, JointMotionKind,
+};
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, Veto, VetoReason};
+use std::cell::OnceCell;
 use std::f64::consts::PI;
 
 /// Largest number of distinct postures at a target that are sought: an arm of six joints with a spherical wrist has
@@ -43,6 +46,10 @@ pub struct JointSpace<'a, const D: usize> {
     k: usize,
     /// Longest move of a connector between two postures that are checked, meters.
     step_m: f64,
+    /// The overlaps of its body at the present posture; found when first asked for.
+    present_contacts: OnceCell<Vec<BodyContact>>,
+    /// Bounds on the travel of its body's parts; computed when first asked for.
+    travel: OnceCell<BodyTravel>,
 }
 
 impl<'a, const D: usize> JointSpace<'a, D> {
@@ -57,7 +64,16 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         let JointPosture { arm, joints } = present;
         let checker = ConstraintChecker { chain, obstacles, self_collision };
         let step_m = chain.step_m().max(MIN_STEP * arm.skeleton.reach_m);
-        Self { arm, present: joints, checker, no_obstacles: Obstacles::default(), k, step_m }
+        Self {
+            arm,
+            present: joints,
+            checker,
+            no_obstacles: Obstacles::default(),
+            k,
+            step_m,
+            present_contacts: OnceCell::new(),
+            travel: OnceCell::new(),
+        }
     }
 
     pub(super) fn arm(&self) -> &'a Arm {
@@ -67,13 +83,18 @@ impl<'a, const D: usize> JointSpace<'a, D> {
     /// Returns the objection to a posture, if there is one; `points` are where it puts the connectors.
     pub fn find_veto(&self, posture: &[f64], points: &[Point<D>]) -> Option<Veto<D>> {
         let Some(body) = &self.arm.body else { return self.checker.find_veto(points, self.k) };
-        // What the joints cannot break, but failed connectors and bends that a scenario limits can.
+        self.find_guide_veto(points).or_else(|| self.find_body_veto(body, posture, points))
+    }
+
+    /// Returns the objection of the rods of an arm with a body: what the joints cannot break, but failed connectors and
+    /// bends that a scenario limits can.
+    fn find_guide_veto(&self, points: &[Point<D>]) -> Option<Veto<D>> {
         let alone = ConstraintChecker {
             obstacles: &self.no_obstacles,
             self_collision: false,
             ..self.checker
         };
-        alone.find_veto(points, self.k).or_else(|| self.find_body_veto(body, posture, points))
+        alone.find_veto(points, self.k)
     }
 
     /// Returns the objection of a link that would be in something, or deeper in it than it is now: an arm that starts
@@ -85,13 +106,9 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         points: &[Point<D>],
     ) -> Option<Veto<D>> {
         let ConstraintChecker { obstacles, self_collision, .. } = self.checker;
-        let contact_at =
-            |values| body.deepest_contact(self.arm.posture(values), obstacles, self_collision);
-        let contact = contact_at(posture)?;
-        let present_m = contact_at(self.present).map_or(0.0, |present| present.depth_m);
-        if contact.depth_m <= present_m {
-            return None;
-        }
+        let posture = self.arm.posture(posture);
+        let allowed = self.present_contacts(body);
+        let contact = body.find_deeper_contact(posture, obstacles, self_collision, allowed)?;
         let reason = match contact.obstacle {
             Some(_) => VetoReason::BothSidesBlocked,
             None => VetoReason::SelfCollision,
@@ -99,6 +116,50 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         let by = self.arm.connector_of_link(contact.link);
         let reached = points[self.k];
         Some(Veto { by, from: self.k, reason, obstacle: contact.obstacle, reached })
+    }
+
+    /// Returns the overlaps at the present posture, which may stay as deep as they are.
+    fn present_contacts(&self, body: &ArmBody) -> &[BodyContact] {
+        let ConstraintChecker { obstacles, self_collision, .. } = self.checker;
+        let present = self.arm.posture(self.present);
+        self.present_contacts.get_or_init(|| body.contacts(present, obstacles, self_collision))
+    }
+
+    /// Returns whether some bends are limited or some connectors failed, which postures between two valid ones may
+    /// break.
+    fn has_guide_limits(&self) -> bool {
+        let mut connectors = self.checker.chain.connectors().iter();
+        connectors.any(|connector| connector.failed || connector.max_bend_rad < PI)
+    }
+
+    /// Returns the number of steps of a straight path of which none is longer than those that are checked.
+    fn steps(&self, a: &Vec<f64>, b: &Vec<f64>) -> usize {
+        (self.distance_m(a, b) / self.step_m).ceil().max(1.0) as usize
+    }
+
+    /// Returns whether all of the straight path of an arm with a body after `a` is free.
+    fn is_body_path_free(&self, body: &ArmBody, a: &Vec<f64>, b: &Vec<f64>) -> bool {
+        if !self.is_free(b) {
+            return false;
+        }
+        let steps = self.steps(a, b);
+        let is_guide_free = |step: usize| {
+            let posture = self.interpolate(a, b, step as f64 / steps as f64);
+            self.find_guide_veto(&self.arm.connector_positions(&posture)).is_none()
+        };
+        if steps > 1 && self.has_guide_limits() && !(1..steps).all(is_guide_free) {
+            return false;
+        }
+        let ConstraintChecker { obstacles, self_collision, .. } = self.checker;
+        let check = BodyPathCheck {
+            body,
+            travel: self.travel.get_or_init(|| BodyTravel::new(&self.arm.serial, body)),
+            start: self.arm.posture(a),
+            obstacles,
+            own: self_collision,
+            allowed: self.present_contacts(body),
+        };
+        steps == 1 || check.is_free(b, steps)
     }
 
     /// Returns valid postures that reach the target, those nearest to the present one first.
@@ -149,11 +210,20 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
     }
 
     fn is_free(&self, posture: &Vec<f64>) -> bool {
-        self.find_veto(posture, &self.arm.connector_positions(posture)).is_none()
+        let points = self.arm.connector_positions(posture);
+        let Some(body) = &self.arm.body else { return self.find_veto(posture, &points).is_none() };
+        let ConstraintChecker { obstacles, self_collision, .. } = self.checker;
+        let allowed = self.present_contacts(body);
+        let placed = self.arm.posture(posture);
+        self.find_guide_veto(&points).is_none()
+            && !body.has_deeper_contact(placed, obstacles, self_collision, allowed)
     }
 
     fn is_path_free(&self, a: &Vec<f64>, b: &Vec<f64>) -> bool {
-        let n = (self.distance_m(a, b) / self.step_m).ceil().max(1.0) as usize;
+        if let Some(body) = &self.arm.body {
+            return self.is_body_path_free(body, a, b);
+        }
+        let n = self.steps(a, b);
         (1..=n).all(|step| {
             interrupt::check();
             self.is_free(&self.interpolate(a, b, step as f64 / n as f64))

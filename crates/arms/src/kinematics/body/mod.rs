@@ -4,21 +4,30 @@
 //! hull   the convex hulls of meshes
 //! mount  where a link of the model is, at a posture of the arm
 //! pairs  the pairs of parts that must not touch
-//! surroundings  distances from obstacles in the world, and between own parts
+//! contacts  overlaps with obstacles in the world, and of own parts
+//! surroundings  distances from them
+//! travel  bounds on the travel of parts
+//! path   the check of a straight path of the joints
 //! ```
 //!
 //! All links of the model count, those beside the arm as well (a second finger, the column that an
 //! arm stands on): they stay where their joints are at rest, unless these follow joints of the arm.
 //! Distances are those of the crate `parry3d-f64`.
 
+mod contacts;
 mod hull;
 mod mount;
 mod pairs;
+mod path;
 mod surroundings;
 #[cfg(test)]
 mod tests;
+mod travel;
 
-pub use surroundings::{BodyContact, BodyPosture};
+pub use contacts::BodyContact;
+pub use path::BodyPathCheck;
+pub use surroundings::BodyPosture;
+pub use travel::BodyTravel;
 
 use super::serial::{LinkFrames, SerialChain};
 use super::transform::{Transform, Vector};

@@ -3,6 +3,7 @@
 use super::super::serial::{JointCoupling, JointMotionKind, SerialChain};
 use super::super::transform::Transform;
 use sidestep_import::urdf::Model;
+use sidestep_kernel::geometry::norm;
 
 /// A frame that hangs on a link of the arm, at joints of its own where it is beside the arm.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +25,22 @@ struct MimicJoint {
     drive: JointCoupling,
 }
 
+impl MimicJoint {
+    /// Returns a bound on the distance of what it carries from what carries it, m; infinite if it slides after a joint
+    /// without limits.
+    fn reach_m(&self, chain: &SerialChain) -> f64 {
+        let offset_m = norm(self.before.origin_m);
+        match self.motion {
+            JointMotionKind::Turn => offset_m,
+            JointMotionKind::Slide => {
+                let limits = chain.variables[self.drive.variable].limits;
+                let largest = limits.map_or(f64::INFINITY, |l| l.lower.abs().max(l.upper.abs()));
+                offset_m + self.drive.offset.abs() + self.drive.multiplier.abs() * largest
+            }
+        }
+    }
+}
+
 impl LinkMount {
     /// Returns a frame that is fixed in a link of the arm.
     pub(super) fn rigid(link: usize, last: Transform) -> Self {
@@ -42,6 +59,28 @@ impl LinkMount {
     /// Returns whether it never moves against the link that it hangs on.
     pub(super) fn is_rigid(&self) -> bool {
         self.steps.is_empty()
+    }
+
+    /// Returns a bound on the distance of the frame from the link that it hangs on, m.
+    pub(super) fn reach_m(&self, chain: &SerialChain) -> f64 {
+        let steps_m = self.steps.iter().map(|step| step.reach_m(chain));
+        steps_m.sum::<f64>() + norm(self.last.origin_m)
+    }
+
+    /// Returns bounds on the travel of points up to `beyond_m` from the frame, per unit of the variable of each joint
+    /// between it and the link, m.
+    pub(super) fn levers_m(&self, chain: &SerialChain, beyond_m: f64) -> Vec<(usize, f64)> {
+        let mut levers = Vec::with_capacity(self.steps.len());
+        let mut reach_m = beyond_m + norm(self.last.origin_m);
+        for step in self.steps.iter().rev() {
+            let lever_m = match step.motion {
+                JointMotionKind::Turn => reach_m,
+                JointMotionKind::Slide => 1.0,
+            };
+            levers.push((step.drive.variable, lever_m * step.drive.multiplier.abs()));
+            reach_m += step.reach_m(chain);
+        }
+        levers
     }
 
     /// Returns where `inner` is, a frame given in this one.

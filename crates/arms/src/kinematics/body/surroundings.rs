@@ -24,17 +24,6 @@ pub struct BodyPosture<'a> {
     pub values: &'a [f64],
 }
 
-/// A part of an arm that overlaps an obstacle or another part.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodyContact {
-    /// The link of the arm that it moves with, the base being 0.
-    pub link: usize,
-    /// The obstacle; none of an overlap with another part.
-    pub obstacle: Option<u32>,
-    /// How far they overlap in m, above 0.
-    pub depth_m: f64,
-}
-
 /// The nearest body to one that moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct NearestBody {
@@ -127,22 +116,6 @@ impl ArmBody {
         exempt
     }
 
-    /// Returns the deepest overlap at a posture: with an obstacle, or of two parts if `own` ones count. Parts that are
-    /// fixed in the base never meet obstacles: they cannot get away.
-    pub fn deepest_contact<const D: usize>(
-        &self,
-        posture: BodyPosture<'_>,
-        obstacles: &Obstacles<D>,
-        own: bool,
-    ) -> Option<BodyContact> {
-        let shapes = self.shapes_at(posture);
-        let nearest = self.nearest_obstacle(&shapes, obstacles, 0.0);
-        let own = own.then(|| self.nearest_own_part(&shapes, 0.0)).flatten();
-        let deepest = nearest.into_iter().chain(own).min_by(|a, b| a.apart_m.total_cmp(&b.apart_m));
-        let NearestBody { link, obstacle, apart_m } = deepest.filter(|near| near.apart_m < 0.0)?;
-        Some(BodyContact { link, obstacle, depth_m: -apart_m })
-    }
-
     /// Returns the least distance of a part from an obstacle up to `look_m`, and the link of that part; negative where
     /// they overlap.
     pub fn clearance_m<const D: usize>(
@@ -163,14 +136,19 @@ impl ArmBody {
     }
 
     /// Returns where all parts are in the world.
-    fn shapes_at(&self, posture: BodyPosture<'_>) -> Vec<PlacedShape> {
+    pub(super) fn shapes_at(&self, posture: BodyPosture<'_>) -> Vec<PlacedShape> {
+        let mut shapes = Vec::with_capacity(self.parts.len());
+        self.place_shapes_at(posture, &mut shapes);
+        shapes
+    }
+
+    /// Computes where all parts are in the world.
+    pub(super) fn place_shapes_at(&self, posture: BodyPosture<'_>, shapes: &mut Vec<PlacedShape>) {
         let BodyPosture { chain, at_m, values } = posture;
         let mut frames = chain.forward_kinematics(values);
         let base = Transform::from_translation(at_m);
         frames.links.iter_mut().for_each(|link| *link = base.compose(link));
-        let mut shapes = Vec::with_capacity(self.parts.len());
-        self.place_shapes(&frames, values, &mut shapes);
-        shapes
+        self.place_shapes(&frames, values, shapes);
     }
 
     fn nearest_own_part(&self, shapes: &[PlacedShape], within_m: f64) -> Option<NearestBody> {
@@ -197,17 +175,12 @@ impl ArmBody {
     ) -> Option<NearestBody> {
         let mut nearest: Option<NearestBody> = None;
         for (part, shape) in self.parts.iter().zip(shapes) {
-            if part.mount.link == 0 && part.mount.is_rigid() {
+            if part.is_fixed_in_base() {
                 continue;
             }
             let center = convert_dimensions(shape.center_m);
             let room = Aabb::from_points(&[center]).grown(part.radius_m + within_m);
             obstacles.visit(&room, |obstacle| {
-                let gap_m = obstacle.core.nearest_to_point(center).distance_m - obstacle.radius_m;
-                // The ball around the part is apart from it: far cheaper than a query of parry.
-                if gap_m > part.radius_m + within_m {
-                    return;
-                }
                 let Some(apart_m) = part.distance_m(shape, obstacle, within_m) else { return };
                 let order = |near: &NearestBody| (near.apart_m, near.obstacle);
                 let found =
@@ -222,13 +195,24 @@ impl ArmBody {
 }
 
 impl LinkShape {
+    /// Returns whether it never moves.
+    pub(super) fn is_fixed_in_base(&self) -> bool {
+        self.mount.link == 0 && self.mount.is_rigid()
+    }
+
     /// Returns the distance of the part from an obstacle in m, if it is at most `within_m`.
-    fn distance_m<const D: usize>(
+    pub(super) fn distance_m<const D: usize>(
         &self,
         placed: &PlacedShape,
         obstacle: &Obstacle<D>,
         within_m: f64,
     ) -> Option<f64> {
+        let center = convert_dimensions(placed.center_m);
+        let gap_m = obstacle.core.nearest_to_point(center).distance_m - obstacle.radius_m;
+        // The ball around the part is apart from it: far cheaper than a query of parry.
+        if gap_m > self.radius_m + within_m {
+            return None;
+        }
         let upright = |at_m: Vector| ParryPose::from_parts(vector(at_m), Rotation::IDENTITY);
         let apart_m = |at: &ParryPose, other: &dyn ParryShape, within_m: f64| {
             let near = proximity_within(&placed.pose, self.core.shape(), at, other, within_m)?;

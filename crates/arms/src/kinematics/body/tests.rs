@@ -2,6 +2,7 @@ use super::*;
 use crate::kinematics::{ArmBodyPart as HitPart, ArmGoal, CollidesWith, IkFailure, ObstacleSphere};
 use proptest::prelude::*;
 use sidestep_import::urdf::srdf::Semantics;
+use sidestep_rods::{Obstacle, Obstacles};
 use sidestep_testing::robot_model as shared;
 use std::path::Path;
 
@@ -169,4 +170,128 @@ fn shared_arms_have_bodies_or_remarks_why_not() {
     let body = ArmBody::new(&model, &chain, &model.solids(&urdf).solids, &masks);
     // Boxes of two fingers, which may touch each other.
     assert_eq!((body.len(), body.pairs().len()), (8, 0));
+}
+
+fn balls(balls: &[([f64; 3], f64)]) -> Obstacles<3> {
+    let ids = 0..;
+    let all = ids.zip(balls).map(|(id, &(at, radius_m))| Obstacle::ball(id, at, radius_m));
+    Obstacles::new(all.collect(), 1.0).expect("obstacles")
+}
+
+fn at<'a>(chain: &'a SerialChain, values: &'a [f64]) -> BodyPosture<'a> {
+    BodyPosture { chain, at_m: [0.0; 3], values }
+}
+
+#[test]
+fn a_part_in_one_obstacle_may_not_go_as_deep_into_another() {
+    let (model, chain) = bars("tip");
+    let body = body_of(&model, &chain, &[]);
+    // The first bar is 0.03 m deep in one ball at its left side; turned to the right it meets the other one.
+    let obstacles = balls(&[([0.5, 0.12, 1.0], 0.1), ([0.5, -0.18, 1.0], 0.1)]);
+    let allowed = body.contacts(at(&chain, &[0.0; 3]), &obstacles, true);
+    let depths: Vec<(Option<u32>, f64)> = allowed.iter().map(|c| (c.obstacle, c.depth_m)).collect();
+    let [(Some(0), depth_m)] = depths[..] else { panic!("{depths:?}") };
+    assert!((depth_m - 0.03).abs() < 1e-6, "{depth_m}");
+    let deeper = |turn: f64| {
+        let values = [turn, 0.0, 0.0];
+        let posture = at(&chain, &values);
+        let found = body.find_deeper_contact(posture, &obstacles, true, &allowed);
+        let has_one = body.has_deeper_contact(posture, &obstacles, true, &allowed);
+        assert_eq!(found.is_some(), has_one);
+        found.map(|contact| contact.obstacle)
+    };
+    // 0.02 m of way at the ball: out of the first one.
+    assert_eq!(deeper(-0.04), None);
+    assert_eq!(deeper(0.04), Some(Some(0)));
+    // Less deep in the second one than it was in the first.
+    let turned = [-0.1, 0.0, 0.0];
+    let second = body.deepest_contact(at(&chain, &turned), &obstacles, true).expect("a contact");
+    assert_eq!(second.obstacle, Some(1));
+    assert!(second.depth_m < depth_m, "{second:?}");
+    assert_eq!(deeper(-0.1), Some(Some(1)));
+    // Of the second bar in the first ball nothing was allowed, nor of the arm in itself.
+    let turn = 2.0 * std::f64::consts::PI / 3.0;
+    let folded = [0.0, turn, turn];
+    let own = body.find_deeper_contact(at(&chain, &folded), &balls(&[]), true, &allowed);
+    assert_eq!(own.map(|contact| contact.obstacle), Some(None));
+    assert_eq!(body.find_deeper_contact(at(&chain, &folded), &balls(&[]), false, &allowed), None);
+}
+
+proptest! {
+    /// By many postures on the path.
+    #[test]
+    fn a_path_is_free_exactly_if_no_posture_on_it_overlaps(
+        ends in prop::array::uniform2(prop::array::uniform3(-2.5..2.5f64)),
+        ball in prop::array::uniform3(-2.0..2.0f64),
+        steps in 1_usize..200,
+    ) {
+        let (model, chain) = bars("left");
+        let body = body_of(&model, &chain, &[]);
+        let obstacles = balls(&[([ball[0], ball[1], 1.0], 0.1 + 0.1 * ball[2].abs())]);
+        let [from, to] = ends.map(|[a, b, c]| [a, b, c, 0.02 + 0.01 * c.abs()]);
+        let travel = BodyTravel::new(&chain, &body);
+        let allowed = body.contacts(at(&chain, &from), &obstacles, true);
+        let check = BodyPathCheck {
+            body: &body,
+            travel: &travel,
+            start: at(&chain, &from),
+            obstacles: &obstacles,
+            own: true,
+            allowed: &allowed,
+        };
+        let is_free = check.is_free(&to, steps);
+        let depth_at = |fraction: f64| {
+            let values: Vec<f64> =
+                from.iter().zip(&to).map(|(from, to)| from + fraction * (to - from)).collect();
+            let contact =
+                body.find_deeper_contact(at(&chain, &values), &obstacles, true, &allowed);
+            contact.map_or(0.0, |contact| contact.depth_m)
+        };
+        // A piece of the least length may hide an overlap no deeper than what is traveled on half of it.
+        let changes: Vec<f64> = from.iter().zip(&to).map(|(from, to)| to - from).collect();
+        let most_m = (0..body.len()).map(|part| travel.part_m(part, &changes)).fold(0.0, f64::max);
+        let missed_m = 2.0 * most_m / steps as f64;
+        let deepest_m = (0..=1024).map(|k| depth_at(f64::from(k) / 1024.0)).fold(0.0, f64::max);
+        if is_free {
+            prop_assert!(deepest_m <= missed_m, "{deepest_m} {missed_m}");
+        } else {
+            // Middles of pieces are among these, as long as pieces are no shorter.
+            prop_assert!(deepest_m > 0.0);
+        }
+    }
+
+    /// Of points as far from the centers of parts as they reach.
+    #[test]
+    fn no_part_travels_farther_than_its_bound(
+        turns in prop::array::uniform2(prop::array::uniform3(-2.0..2.0f64)),
+        slides in prop::array::uniform2(0.0..0.1f64),
+    ) {
+        let (model, chain) = bars("left");
+        let body = body_of(&model, &chain, &[]);
+        let travel = BodyTravel::new(&chain, &body);
+        let [from, to] = [0, 1].map(|k| [turns[k][0], turns[k][1], turns[k][2], slides[k]]);
+        let changes: Vec<f64> = from.iter().zip(&to).map(|(from, to)| to - from).collect();
+        let place = |values: &[f64], part: usize| {
+            let frames = chain.forward_kinematics(values);
+            body.parts[part].mount.transform(&frames.links, values)
+        };
+        for a in 0..body.len() {
+            let far = [0.0, body.parts[a].radius_m, 0.0];
+            let [p, q] = [&from, &to].map(|values| place(values, a).transform_point(far));
+            prop_assert!(apart_m(p, q) <= travel.part_m(a, &changes) + 1e-9, "part {a}");
+            for b in 0..a {
+                let against = |values: &[f64; 4]| {
+                    let at = place(values, a).transform_point(far);
+                    place(values, b).inverse_transform_point(at)
+                };
+                let bound_m = travel.pair_m(a, b, &changes);
+                prop_assert!((travel.pair_m(b, a, &changes) - bound_m).abs() < 1e-12);
+                // Seen from the part that is nearer to the base.
+                if body.link(b) <= body.link(a) {
+                    let moved_m = apart_m(against(&from), against(&to));
+                    prop_assert!(moved_m <= bound_m + 1e-9, "parts {a} and {b}: {moved_m} {bound_m}");
+                }
+            }
+        }
+    }
 }
