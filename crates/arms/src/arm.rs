@@ -3,10 +3,9 @@
 use super::kinematics::{
     ArmBody, ArmGoal, BodyPosture, ConnectorTargetSolver, SerialChain, Skeleton, Vector,
 };
-use super::motion::MotionFilter;
+use super::motion::{AssumedSpeed, CutRates, MotionFilter};
 use sidestep_import::report::Finding;
 use sidestep_import::urdf::Solid;
-use sidestep_import::urdf::joint_limits::GivenRates;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, convert_dimensions, sub};
 use sidestep_rods::{Chain, Connector, Mobility, Rod};
@@ -22,10 +21,10 @@ const MIN_BEND_RAD: f64 = 1e-9;
 /// Where the highest rates of an arm's joints are from, beside its model.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RateSources {
-    /// The names of joints whose highest speed is assumed, because nothing gives it.
-    pub assumed_speeds: Vec<String>,
-    /// The rates that no joint exceeds, whatever it may by itself.
-    pub at_most: GivenRates,
+    /// The joints whose highest speed is assumed, because nothing gives it.
+    pub assumed_speeds: Vec<AssumedSpeed>,
+    /// Of each variable, which rates are those that no joint exceeds, whatever it may by itself.
+    pub cut: Vec<CutRates>,
 }
 
 /// An arm: its joints, its connectors, and the place of its base.

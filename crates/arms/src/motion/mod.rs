@@ -11,4 +11,4 @@ mod rates;
 mod tests;
 
 pub use filter::{MotionFilter, MotionState, MotionStep};
-pub use rates::{JointRates, joint_rates};
+pub use rates::{AssumedSpeed, CutRates, JointRates, assumed_speeds, joint_rates, rates_cut_by};

@@ -1,10 +1,62 @@
 //! Filtered motions against closed forms and against the rates themselves.
 
 use super::*;
+use crate::kinematics::SerialChain;
 use proptest::prelude::*;
+use sidestep_import::urdf::Model;
+use sidestep_import::urdf::joint_limits::{GivenRates, JointRates as RatesByName};
 
 fn rates(speed: f64, acceleration: f64, jerk: f64) -> JointRates {
     JointRates { speed, acceleration, jerk }
+}
+
+/// An arm whose second joint turns `multiplier` times as far as its first; `limits` are their attributes.
+fn mimicking(multiplier: f64, [first, second]: [&str; 2]) -> SerialChain {
+    let text = format!(
+        "<robot name='r'><link name='a'/><link name='b'/><link name='c'/>\
+         <joint name='j' type='revolute'><parent link='a'/><child link='b'/><axis xyz='0 0 1'/>\
+         <limit lower='-1' upper='1' {first}/></joint>\
+         <joint name='k' type='revolute'><parent link='b'/><child link='c'/><axis xyz='0 0 1'/>\
+         <limit lower='-9' upper='9' {second}/><mimic joint='j' multiplier='{multiplier}'/></joint></robot>"
+    );
+    let model = Model::parse("r", &text).expect("a model");
+    SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("an arm")
+}
+
+#[test]
+fn assumed_speeds_are_told_of_joints_that_mimic_others_where_they_limit() {
+    let named = |multiplier, limits| {
+        let chain = mimicking(multiplier, limits);
+        let assumed = assumed_speeds(&chain, &RatesByName::new(), GivenRates::default());
+        assumed.into_iter().map(|assumed| assumed.joint).collect::<Vec<_>>()
+    };
+    let given = "velocity='1'";
+    // Half a turn a second of the second joint is a tenth of that of the first.
+    assert_eq!(named(10.0, [given, ""]), ["k"]);
+    // A fifth of the first joint's own speed would be enough for it.
+    assert_eq!(named(0.2, [given, ""]), [""; 0]);
+    // 1 rad/s of the second joint lets the first reach 0.1 rad/s, whatever it may by itself.
+    assert_eq!(named(10.0, ["", given]), [""; 0]);
+    assert_eq!(named(0.1, ["", given]), ["j"]);
+    assert_eq!(named(1.0, ["", ""]), ["j", "k"]);
+    let at_most = GivenRates { speed: Some(1.0), ..GivenRates::default() };
+    let chain = mimicking(10.0, ["", ""]);
+    assert_eq!(assumed_speeds(&chain, &RatesByName::new(), at_most), []);
+}
+
+#[test]
+fn the_key_that_limits_a_joint_is_known_also_through_one_that_mimics_it() {
+    let chain = mimicking(10.0, ["velocity='1'", "velocity='9'"]);
+    let cut = |acceleration, jerk| {
+        let at_most = GivenRates { speed: None, acceleration, jerk };
+        rates_cut_by(&chain, &RatesByName::new(), at_most)[0]
+    };
+    assert_eq!(cut(None, None), CutRates::default());
+    // The second joint's 0.5 rad/s2 are 0.05 rad/s2 of the first.
+    let lower = CutRates { acceleration: true, jerk: false };
+    assert_eq!(cut(Some(0.5), None), lower);
+    assert_eq!(cut(Some(1e3), Some(1e9)), CutRates::default());
+    assert!(cut(Some(1e3), Some(1.0)).jerk);
 }
 
 /// The position at time `t` of a motion from rest to rest by seven segments of constant jerk: in closed form, with the

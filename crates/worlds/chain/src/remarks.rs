@@ -4,8 +4,7 @@ use super::scenario::ChainScenario;
 use super::scenario::own_overlap_text;
 use super::world::{ChainChangeKind, ChainSpec, ChainWorld};
 use sidestep_arms::kinematics::JointMotionKind;
-use sidestep_arms::motion::JointRates;
-use sidestep_import::urdf::joint_limits::GivenRates;
+use sidestep_arms::motion::{AssumedSpeed, CutRates};
 use sidestep_rods::{Mobility, RodBvh};
 use sidestep_scenario::Remark;
 use std::collections::BTreeSet;
@@ -124,11 +123,9 @@ fn slow_network_remark<const D: usize>(
 fn unlimited_speeds_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<Remark> {
     let arm = spec.arm.as_deref()?;
     let mut taken = Vec::new();
-    for (joint, rates) in arm.serial.variables.iter().zip(arm.motion.rates()) {
-        if arm.rate_sources.assumed_speeds.contains(&joint.name) {
-            let unit = if joint.motion == JointMotionKind::Turn { "rad/s" } else { "m/s" };
-            taken.push(format!("`{}` {:.4} {unit}", joint.name, rates.speed));
-        }
+    for AssumedSpeed { joint, speed, motion } in &arm.rate_sources.assumed_speeds {
+        let unit = if *motion == JointMotionKind::Turn { "rad/s" } else { "m/s" };
+        taken.push(format!("`{joint}` {speed:.4} {unit}"));
     }
     if taken.is_empty() {
         return None;
@@ -160,14 +157,15 @@ fn slow_joints_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<R
     let motion = &arm.motion;
     let mut slow = Vec::new();
     let mut limiting_keys = BTreeSet::new();
-    for ((joint, rates), speed) in
-        arm.serial.variables.iter().zip(motion.rates()).zip(motion.reference_speeds())
-    {
+    for (i, speed) in motion.reference_speeds().enumerate() {
+        let joint = &arm.serial.variables[i];
+        let rates = motion.rates()[i];
         if speed < SLOW_FRACTION * rates.speed {
             let unit = if joint.motion == JointMotionKind::Turn { "rad/s" } else { "m/s" };
             let limit = rates.speed;
             slow.push(format!("`{}` at up to {speed:.4} {unit} of {limit:.4}", joint.name));
-            limiting_keys.insert(limiting_key(rates, arm.rate_sources.at_most));
+            let cut = arm.rate_sources.cut.get(i).copied().unwrap_or_default();
+            limiting_keys.insert(limiting_key(cut));
         }
     }
     if slow.is_empty() {
@@ -182,12 +180,12 @@ fn slow_joints_remark<const D: usize>(k: usize, spec: &ChainSpec<D>) -> Option<R
     Some(Remark::note(format!("chains.{k}.arm"), words))
 }
 
-/// Returns what keeps a joint from its highest speed: the key for all joints where that is as low as its own limit.
-fn limiting_key(rates: &JointRates, at_most: GivenRates) -> &'static str {
-    if at_most.acceleration == Some(rates.acceleration) {
+/// Returns what keeps a joint from its highest speed: the key for all joints where that is lower than its own limit.
+fn limiting_key(cut: CutRates) -> &'static str {
+    if cut.acceleration {
         return "arm.max_acceleration";
     }
-    if at_most.jerk == Some(rates.jerk) {
+    if cut.jerk {
         return "arm.max_jerk";
     }
     "max_acceleration or max_jerk in arm.joint_limits"

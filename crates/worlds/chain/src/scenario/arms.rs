@@ -4,7 +4,7 @@ use super::{ChainScenarioCompiler, PositiveNumber};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::kinematics::{ArmBody, SerialChain, Transform};
-use sidestep_arms::motion::{MotionFilter, joint_rates};
+use sidestep_arms::motion::{MotionFilter, assumed_speeds, joint_rates, rates_cut_by};
 use sidestep_arms::{Arm, RateSources};
 use sidestep_import::report::Finding;
 use sidestep_import::urdf::joint_limits::{self, GivenRates, JointRates};
@@ -108,15 +108,8 @@ impl ArmSection {
     /// Returns where the rates of joints are from; `given` are those of a file.
     fn rate_sources(&self, serial: &SerialChain, given: &JointRates) -> RateSources {
         let at_most = self.highest_rates();
-        let is_in_file = |name: &str| given.get(name).is_some_and(|rates| rates.speed.is_some());
-        let mut assumed_speeds = Vec::new();
-        for variable in &serial.variables {
-            let is_given = variable.max_speed.is_some() || is_in_file(&variable.name);
-            if !is_given && at_most.speed.is_none() {
-                assumed_speeds.push(variable.name.clone());
-            }
-        }
-        RateSources { assumed_speeds, at_most }
+        let assumed_speeds = assumed_speeds(serial, given, at_most);
+        RateSources { assumed_speeds, cut: rates_cut_by(serial, given, at_most) }
     }
 }
 
