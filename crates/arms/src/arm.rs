@@ -1,14 +1,14 @@
 //! An arm of joints as a chain of rods (slides K1 to K4).
 
 use super::kinematics::{
-    ArmBody, ArmGoal, BodyPosture, ConnectorTargetSolver, SerialChain, Skeleton, Vector,
+    ArmBody, ArmGoal, BodyPosture, BodyTravel, ConnectorTargetSolver, SerialChain, Skeleton, Vector,
 };
 use super::motion::{AssumedSpeed, CutRates, MotionFilter};
 use sidestep_import::report::Finding;
 use sidestep_import::urdf::Solid;
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, convert_dimensions, sub};
-use sidestep_rods::{Chain, Connector, Mobility, Rod};
+use sidestep_rods::{Chain, Connector, Mobility, Obstacle, Rod};
 use std::f64::consts::PI;
 
 /// Least length of rods with a joint that can bring their ends together: a rod of no length has no direction.
@@ -46,6 +46,8 @@ pub struct Arm {
     pub rate_sources: RateSources,
     /// The shapes of its links, which then must not touch anything, in place of its rods; none where its rods count.
     pub body: Option<ArmBody>,
+    /// Bounds on the travel of its body's parts; of no part where its rods count.
+    pub travel: BodyTravel,
     /// Parts of its body that overlap at the start, by name with their depth in m: they may.
     pub exempt_overlaps: Vec<(String, String, f64)>,
     /// The shapes of its links as they were read, where some are meshes; none otherwise.
@@ -70,6 +72,7 @@ impl Arm {
             motion,
             rate_sources: RateSources::default(),
             body: None,
+            travel: BodyTravel::default(),
             exempt_overlaps: Vec::new(),
             solids: Vec::new(),
             findings: Vec::new(),
@@ -80,12 +83,18 @@ impl Arm {
     #[must_use]
     pub fn with_body(self, mut body: ArmBody) -> Self {
         let exempt_overlaps = body.exempt_overlaps(self.posture(&self.values));
-        Self { body: Some(body), exempt_overlaps, ..self }
+        let travel = BodyTravel::new(&self.serial, &body);
+        Self { body: Some(body), travel, exempt_overlaps, ..self }
     }
 
     /// Returns a posture in the world.
     pub fn posture<'a>(&'a self, values: &'a [f64]) -> BodyPosture<'a> {
         BodyPosture { chain: &self.serial, at_m: self.at_m, values }
+    }
+
+    /// Returns obstacles that enclose the links of an arm with a body at a posture; none where its rods count.
+    pub fn enclosures<const D: usize>(&self, values: &[f64], id: u32) -> Option<Vec<Obstacle<D>>> {
+        Some(self.body.as_ref()?.enclosures(self.posture(values), id))
     }
 
     /// Returns the connector that stands for a link, the base being link 0.

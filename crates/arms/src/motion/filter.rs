@@ -151,13 +151,44 @@ impl MotionFilter {
         joints: &[f64],
         reference: &[f64],
     ) -> Vec<Vec<f64>> {
+        let count = self.weights.len();
         let mut coming = state.clone();
-        (0..self.weights.len())
-            .map(|_| {
-                coming.push(joints, reference.to_vec(), self.history_len());
-                self.smoothed(&coming)
-            })
-            .collect()
+        coming.push(joints, reference.to_vec(), self.history_len());
+        let first = self.smoothed(&coming);
+        let mut postures = vec![Vec::with_capacity(joints.len()); count];
+        for (i, to) in reference.iter().enumerate() {
+            let oldest_first = coming.references.iter().rev();
+            let left: Vec<f64> = oldest_first.map(|past| past[i] - to).collect();
+            for (posture, away) in postures.iter_mut().zip(self.decay(&left)) {
+                posture.push(to + away);
+            }
+        }
+        // As the cycle itself computes it, and exactly at the reference: running sums differ by rounding.
+        postures[0] = first;
+        if count > 1 {
+            postures[count - 1] = reference.to_vec();
+        }
+        postures
+    }
+
+    /// Returns how far a joint is from where its reference will rest, in the coming cycles, from how far its recent
+    /// references were, the oldest first. By running sums both means take a few steps a cycle, whatever their windows.
+    fn decay(&self, left: &[f64]) -> Vec<f64> {
+        let windows = [self.speed_window, self.weights.len() + 1 - self.speed_window];
+        let mut values = left.to_vec();
+        values.resize(left.len() + self.weights.len() - 1, 0.0);
+        for window in windows {
+            let mut sums = Vec::with_capacity(values.len() + 1);
+            sums.push(0.0);
+            for value in &values {
+                sums.push(sums[sums.len() - 1] + value);
+            }
+            let mean = |end: usize| (sums[end] - sums[end - window]) / window as f64;
+            // Earlier means lack values; none of them is asked for.
+            values = (window..sums.len()).map(mean).collect();
+        }
+        let from = values.len() - self.weights.len();
+        values.split_off(from)
     }
 
     /// Advances the joints by a cycle in which the reference goes to `reference`.

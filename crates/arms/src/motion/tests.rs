@@ -164,6 +164,33 @@ fn a_step_of_the_reference_is_followed_as_the_mean_of_means() {
     }
 }
 
+/// By their definition, from any recent motion.
+#[test]
+fn the_coming_postures_are_the_weighted_means_of_their_references() {
+    for dt_s in [0.02, 0.004] {
+        let filter = MotionFilter::new(vec![rates(1.0, 4.0, 100.0); 2], dt_s).expect("windows");
+        let mut state = MotionState::default();
+        let mut joints = vec![0.0, 0.5];
+        for k in 0..40 {
+            let wave = f64::from(k) * 0.37;
+            let reference = [0.003 * f64::from(k), 0.5 + 0.002 * wave.sin()];
+            let coming = filter.stop_postures(&state, &joints, &reference);
+            // Advanced by resting at the reference.
+            let mut later = state.clone();
+            let mut at = joints.clone();
+            for (cycle, posture) in coming.iter().enumerate() {
+                at = filter.advance(&mut later, &at, &reference).joints;
+                for (one, other) in posture.iter().zip(&at) {
+                    assert!((one - other).abs() < 1e-12, "{dt_s} {k} {cycle}: {posture:?} {at:?}");
+                }
+            }
+            assert_eq!(coming[0], filter.advance(&mut state.clone(), &joints, &reference).joints);
+            assert_eq!(coming[coming.len() - 1], reference);
+            joints = filter.advance(&mut state, &joints, &reference).joints;
+        }
+    }
+}
+
 #[test]
 fn states_survive_their_rows() {
     let filter =

@@ -2,6 +2,7 @@
 //! the tool.
 
 use super::joints::JointSpace;
+use super::shortcuts::shorten_joint_path;
 use super::{ConfigurationSpace, find_path};
 use crate::arm::Arm;
 use crate::kinematics::{ArmGoal, FrameAxis, OrientationMask, Transform, rotation_vector};
@@ -78,7 +79,8 @@ pub fn plan_to_goal<const D: usize>(
         }
     };
     let free = postures.into_iter().filter(|posture| space.is_free(posture));
-    Ok(find_path(space, Vec::new(), free.take(MAX_GOALS).collect(), draws))
+    let path = find_path(space, Vec::new(), free.take(MAX_GOALS).collect(), draws);
+    Ok(path.map(|path| shorten_joint_path(space, path, draws)))
 }
 
 /// Plans the straight line of the tip from where it is to a pose, turning evenly: the joint values after the present
@@ -162,30 +164,11 @@ fn next_axis(axis: FrameAxis) -> FrameAxis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinematics::SerialChain;
-    use crate::motion::{MotionFilter, joint_rates};
     use crate::plan::JointPosture;
-    use sidestep_import::urdf::Model;
-    use sidestep_import::urdf::joint_limits::{GivenRates, JointRates};
+    use crate::plan::joints::tests::arm;
     use sidestep_kernel::Seed;
     use sidestep_kernel::stream::{Purpose, Streams};
     use sidestep_rods::Obstacles;
-    use sidestep_testing::root;
-
-    /// The shipped arm of seven joints, whose elbow and wrist are bent.
-    fn arm() -> Arm {
-        let file = root().join("scenarios/chain/arm.urdf");
-        let model = Model::load(&file).expect("a model");
-        let serial = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("arm");
-        let rates = joint_rates(&serial, &JointRates::new(), GivenRates::default());
-        let values = vec![0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0];
-        Arm::new(
-            serial,
-            [0.0; 3],
-            values,
-            MotionFilter::new(rates, 0.02).expect("windows of few cycles"),
-        )
-    }
 
     #[test]
     fn a_planned_path_ends_in_the_pose_and_in_the_joint_values_that_are_asked_for() {

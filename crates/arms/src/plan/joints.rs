@@ -3,9 +3,7 @@
 use super::{ConfigurationSpace, PlanningQuery};
 use crate::arm::Arm;
 use crate::ik::constraints::ConstraintChecker;
-use crate::kinematics::{
-    ArmBody, ArmGoal, BodyContact, BodyPathCheck, BodyTravel, JointMotionKind,
-};
+use crate::kinematics::{ArmBody, ArmGoal, BodyContact, BodyPathCheck, JointMotionKind};
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::Point;
@@ -21,6 +19,9 @@ const MAX_RESTARTS: usize = 60;
 /// Largest number of those from which the second tree grows, the nearest first: some may be cut off from the present
 /// one.
 const MAX_GOALS: usize = 4;
+/// Random postures that trees grow toward, at most: with a fifth of them OMPL found two paths of 67 that these trees
+/// did not, with these none (`benches/planning`).
+const MAX_JOINT_SAMPLES: usize = 10_000;
 /// Least step between two postures that are checked, as a fraction of the arm's reach. The step is otherwise a quarter
 /// of the least rod or radius, and tiny connectors would make checks of a path endless; thinner obstacles may then be
 /// missed between two checks. With 1e-3 a stride of a tree takes about a thousand checks at most. The value trades
@@ -48,8 +49,6 @@ pub struct JointSpace<'a, const D: usize> {
     step_m: f64,
     /// The overlaps of its body at the present posture; found when first asked for.
     present_contacts: OnceCell<Vec<BodyContact>>,
-    /// Bounds on the travel of its body's parts; computed when first asked for.
-    travel: OnceCell<BodyTravel>,
 }
 
 impl<'a, const D: usize> JointSpace<'a, D> {
@@ -72,12 +71,19 @@ impl<'a, const D: usize> JointSpace<'a, D> {
             k,
             step_m,
             present_contacts: OnceCell::new(),
-            travel: OnceCell::new(),
         }
     }
 
     pub(super) fn arm(&self) -> &'a Arm {
         self.arm
+    }
+
+    /// Returns a measure of a straight path in time: the root of the sum of the squared times that its joints take at
+    /// their highest speeds, s.
+    pub(super) fn duration_s(&self, a: &[f64], b: &[f64]) -> f64 {
+        let moves = a.iter().zip(b).zip(self.arm.motion.reference_speeds());
+        let times_s = moves.map(|((a, b), speed)| (b - a) / speed);
+        times_s.map(|time_s| time_s * time_s).sum::<f64>().sqrt()
     }
 
     /// Returns the objection to a posture, if there is one; `points` are where it puts the connectors.
@@ -153,7 +159,7 @@ impl<'a, const D: usize> JointSpace<'a, D> {
         let ConstraintChecker { obstacles, self_collision, .. } = self.checker;
         let check = BodyPathCheck {
             body,
-            travel: self.travel.get_or_init(|| BodyTravel::new(&self.arm.serial, body)),
+            travel: &self.arm.travel,
             start: self.arm.posture(a),
             obstacles,
             own: self_collision,
@@ -180,6 +186,10 @@ impl<'a, const D: usize> JointSpace<'a, D> {
 
 impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
     type Posture = Vec<f64>;
+
+    fn max_samples(&self) -> usize {
+        MAX_JOINT_SAMPLES
+    }
 
     fn present_posture(&self) -> Vec<f64> {
         self.present.to_vec()
@@ -247,5 +257,37 @@ impl<const D: usize> ConfigurationSpace for JointSpace<'_, D> {
             values.push(lower + draws.uniform() * (upper - lower));
         }
         values
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::kinematics::SerialChain;
+    use crate::motion::{MotionFilter, joint_rates};
+    use sidestep_import::urdf::Model;
+    use sidestep_import::urdf::joint_limits::{GivenRates, JointRates};
+    use sidestep_testing::root;
+
+    /// The shipped arm of seven joints, whose elbow and wrist are bent.
+    pub(crate) fn arm() -> Arm {
+        let file = root().join("scenarios/chain/arm.urdf");
+        let model = Model::load(&file).expect("a model");
+        let serial = SerialChain::new(&model, model.root, model.default_tip(), "tip").expect("arm");
+        let rates = joint_rates(&serial, &JointRates::new(), GivenRates::default());
+        let values = vec![0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0];
+        let motion = MotionFilter::new(rates, 0.02).expect("windows of few cycles");
+        Arm::new(serial, [0.0; 3], values, motion)
+    }
+
+    /// Calls a function with the space of an arm's tool.
+    pub(crate) fn with_space<T>(
+        arm: &Arm,
+        obstacles: &Obstacles<3>,
+        look: impl FnOnce(&JointSpace<'_, 3>) -> T,
+    ) -> T {
+        let chain = arm.chain(0.02, 0.01).expect("a chain");
+        let start = JointPosture { arm, joints: &arm.values };
+        look(&JointSpace::new(start, &chain, obstacles, true, 3))
     }
 }

@@ -6,6 +6,7 @@
 //! arc.rs:    straight postures and arcs, through which most paths lead
 //! joints.rs: the same for the joints of an arm
 //! goals.rs:  poses of its tool, values of its joints, and straight lines of its tool
+//! shortcuts.rs: shorter paths of joints
 //! tree.rs:   two trees of postures that grow toward each other (RRT-Connect), and shortcuts
 //! ```
 //!
@@ -15,6 +16,7 @@
 mod arc;
 mod goals;
 mod joints;
+mod shortcuts;
 mod space;
 #[cfg(test)]
 mod tests;
@@ -140,7 +142,8 @@ pub fn plan_joints<const D: usize>(
     draws: &mut Draws,
 ) -> Result<Option<Vec<Vec<f64>>>, InputError> {
     let goals = space.goals(query, draws)?;
-    Ok(find_path(space, Vec::new(), goals, draws))
+    let path = find_path(space, Vec::new(), goals, draws);
+    Ok(path.map(|path| shortcuts::shorten_joint_path(space, path, draws)))
 }
 
 /// Plans a path in a space of a caller's own: the postures after the present one, the goal at the end; none if the search

@@ -7,6 +7,7 @@
 //! contacts  overlaps with obstacles in the world, and of own parts
 //! surroundings  distances from them
 //! travel  bounds on the travel of parts
+//! enclosures  the body as an obstacle to others
 //! path   the check of a straight path of the joints
 //! ```
 //!
@@ -15,6 +16,7 @@
 //! Distances are those of the crate `parry3d-f64`.
 
 mod contacts;
+mod enclosures;
 mod hull;
 mod mount;
 mod pairs;

@@ -1,6 +1,7 @@
 use super::*;
 use crate::kinematics::{ArmBodyPart as HitPart, ArmGoal, CollidesWith, IkFailure, ObstacleSphere};
 use proptest::prelude::*;
+use sidestep_import::urdf::Solid;
 use sidestep_import::urdf::srdf::Semantics;
 use sidestep_rods::{Obstacle, Obstacles};
 use sidestep_testing::robot_model as shared;
@@ -294,4 +295,68 @@ proptest! {
             }
         }
     }
+}
+
+/// Every point of a part is in the obstacle that encloses it: points on the surfaces, drawn in its own axes.
+#[test]
+fn enclosures_hold_their_parts() {
+    let (model, chain) = bars("left");
+    let rod =
+        Solid { shape: Shape::Cylinder { radius_m: 0.02, length_m: 0.8 }, ..solid_of(&model) };
+    let disc = Solid { shape: Shape::Cylinder { radius_m: 0.2, length_m: 0.1 }, ..rod.clone() };
+    let corners = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.1], [0.0, 0.2, 0.0], [0.1, 0.1, 0.4]];
+    let hull = Solid { shape: Shape::Hull { points_m: corners.to_vec() }, ..rod.clone() };
+    let solids: Vec<Solid> =
+        model.solids(Path::new("bars.urdf")).solids.into_iter().chain([rod, disc, hull]).collect();
+    let body = ArmBody::new(&model, &chain, &solids, &[]);
+    let values = [0.4, -0.8, 1.1, 0.03];
+    let enclosures: Vec<Obstacle<3>> = body.enclosures(at(&chain, &values), 9);
+    assert_eq!(enclosures.len(), body.len());
+    let mut shapes = Vec::new();
+    body.place_shapes(&chain.forward_kinematics(&values), &values, &mut shapes);
+    for ((part, shape), enclosure) in body.parts.iter().zip(&shapes).zip(&enclosures) {
+        assert_eq!(enclosure.id, 9);
+        // The farthest point of the part in each of many directions, by its support function.
+        let support = part.core.shape().as_support_map().expect("convex");
+        for k in 0..200 {
+            let turn = 2.4 * f64::from(k);
+            let rise = f64::from(k) / 100.0 - 0.995;
+            let flat = (1.0 - rise * rise).sqrt();
+            let direction = vector([flat * turn.cos(), flat * turn.sin(), rise]);
+            let farthest = point(support.support_point(&shape.pose, direction));
+            let outside_m =
+                enclosure.core.nearest_to_point(farthest).distance_m - enclosure.radius_m;
+            assert!(outside_m < 1e-9, "{}: {outside_m}", part.link);
+        }
+        // And it is no larger than twice the ball around the part.
+        let bounds = enclosure.bounds();
+        let size_m = [0, 1, 2].map(|i| bounds.hi[i] - bounds.lo[i]);
+        assert!(size_m.iter().all(|size| *size <= 4.0 * part.radius_m), "{}", part.link);
+    }
+}
+
+fn solid_of(model: &Model) -> Solid {
+    model.solids(Path::new("bars.urdf")).solids[1].clone()
+}
+
+#[test]
+fn no_part_leaves_the_box_that_it_may_enter() {
+    let (model, chain) = bars("left");
+    let body = body_of(&model, &chain, &[]);
+    let travel = BodyTravel::new(&chain, &body);
+    let values = [0.4, -0.8, 1.1, 0.03];
+    let changes = [0.2, 0.1, 0.3, 0.01];
+    let reach = body.reach_box(&travel, at(&chain, &values), &changes);
+    for signs in 0..16 {
+        let moved: Vec<f64> = (0..4)
+            .map(|i| values[i] + changes[i] * if signs >> i & 1 == 1 { 1.0 } else { -1.0 })
+            .collect();
+        for enclosure in body.enclosures::<3>(at(&chain, &moved), 0) {
+            let bounds = enclosure.bounds();
+            let center = [0, 1, 2].map(|i| 0.5 * (bounds.lo[i] + bounds.hi[i]));
+            assert!((0..3).all(|i| reach.lo[i] <= center[i] && center[i] <= reach.hi[i]));
+        }
+    }
+    let still = body.reach_box(&travel, at(&chain, &values), &[0.0; 4]);
+    assert!((0..3).all(|i| reach.hi[i] - reach.lo[i] > still.hi[i] - still.lo[i]));
 }

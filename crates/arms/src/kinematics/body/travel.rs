@@ -15,7 +15,7 @@ struct PartLevers {
 }
 
 /// Bounds on the travel of an arm's parts.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct BodyTravel {
     parts: Vec<PartLevers>,
 }
