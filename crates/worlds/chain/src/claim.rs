@@ -58,7 +58,28 @@ fn cycle_reach_box<const D: usize>(
     let chain_box = Aabb::from_points(chain.points())
         .joined(&reference_box(spec, body))
         .grown(radius_m + moved_m + thrown_m + back_m_s * world.dt_s);
-    chain_box.joined(&robots_reach_box(spec, body, world.dt_s))
+    chain_box
+        .joined(&robots_reach_box(spec, body, world.dt_s))
+        .joined(&links_reach_box(spec, body, world.dt_s))
+}
+
+/// Returns the box that the links of an arm with shapes may enter during one cycle, also on their way to its reference;
+/// none of other chains.
+fn links_reach_box<const D: usize>(
+    spec: &ChainSpec<D>,
+    body: &ChainBodyState<D>,
+    dt_s: f64,
+) -> Aabb<D> {
+    let (Some(arm), Some(joints)) = (&spec.arm, &body.joints) else { return Aabb::empty() };
+    let Some(shapes) = &arm.body else { return Aabb::empty() };
+    let reference = body.motion.reference(joints).iter().zip(joints);
+    // What is left of the way to the reference, and how far that goes in this cycle.
+    let changes: Vec<f64> = reference
+        .zip(arm.motion.reference_speeds())
+        .map(|((to, from), speed)| (to - from).abs() + speed * dt_s)
+        .collect();
+    let reach = shapes.reach_box(&arm.travel, arm.posture(joints), &changes);
+    Aabb { lo: convert_dimensions(reach.lo), hi: convert_dimensions(reach.hi) }
 }
 
 /// Returns the box of the places that an arm's joints may take on their way to their reference; none of other chains,

@@ -93,6 +93,16 @@ pub(crate) struct Targets<const D: usize> {
     pub(crate) goals: Vec<JointGoal>,
     /// The way from one to the next.
     pub(crate) path: TargetPath,
+    /// Distance within which the tool of an arm passes those before the last without coming to rest, meters; none
+    /// where it has to be as near as at the last.
+    pub(crate) blend_m: Option<f64>,
+}
+
+impl<const D: usize> Targets<D> {
+    /// Returns the distance at which a target that is not the last one counts as passed, meters.
+    pub(crate) fn passing_distance_m(&self) -> f64 {
+        self.blend_m.map_or(self.tolerance_m, |blend_m| blend_m.max(self.tolerance_m))
+    }
 }
 
 /// The way from one target to the next.

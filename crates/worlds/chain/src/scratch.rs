@@ -114,12 +114,14 @@ impl<const D: usize> NearbyObstacles<D> {
         let mover_count = self.movers.len();
         let others: Vec<EntitySlot> = others.collect();
         if has_others {
-            others.iter().for_each(|&slot| push_solid_parts(&mut self.movers, slot, state));
+            others.iter().for_each(|&slot| push_solid_parts(&mut self.movers, slot, world, state));
             self.solid.replace_moving(&self.movers).expect(CHECKED);
             self.movers.truncate(mover_count);
         }
         for slot in others {
-            push_part_obstacles(&mut self.movers, slot, &state.body(slot as usize).chain);
+            let body = state.body(slot as usize);
+            let spec = &world.chains[slot as usize];
+            push_part_obstacles(&mut self.movers, slot, spec, body.parts());
         }
         self.all.replace_moving(&self.movers).expect(CHECKED);
         self.moment = Some(moment);
@@ -154,11 +156,12 @@ impl<const D: usize> PositionBuffer<D> {
 fn push_solid_parts<const D: usize>(
     parts: &mut Vec<Obstacle<D>>,
     slot: EntitySlot,
+    world: &ChainWorld<D>,
     state: &ChainWorldState<D>,
 ) {
     let body = state.body(slot as usize);
     if body.robots.is_empty() {
-        return push_part_obstacles(parts, slot, &body.chain);
+        return push_part_obstacles(parts, slot, &world.chains[slot as usize], body.parts());
     }
     parts.extend(body.solids().map(|(_, robot)| {
         Obstacle::ball(OTHER_CHAIN + slot, convert_dimensions(robot.at), robot.radius_m)

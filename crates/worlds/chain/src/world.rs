@@ -190,6 +190,11 @@ impl<const D: usize> ChainChange<D> {
 }
 
 impl<const D: usize> ChainSpec<D> {
+    /// Returns what it is at the start, as [`push_part_obstacles`] takes it.
+    pub(crate) fn start_parts(&self) -> (&Chain<D>, Option<&[f64]>) {
+        (&self.start, self.arm.as_deref().map(|arm| &arm.values[..]))
+    }
+
     /// Returns the robots of a swarm at their connectors, all facing ahead along their chain.
     pub(crate) fn place_robots_at_connectors(
         &self,
@@ -239,13 +244,19 @@ impl<const D: usize> ChainWorld<D> {
     }
 }
 
-/// Adds the parts of a chain as obstacles to others.
+/// Adds the parts of a chain as obstacles to others: of an arm with shapes what encloses its links, of other chains
+/// their connectors and rods. `joints` are those of an arm.
 pub(crate) fn push_part_obstacles<const D: usize>(
     parts: &mut Vec<Obstacle<D>>,
     slot: EntitySlot,
-    chain: &Chain<D>,
+    spec: &ChainSpec<D>,
+    (chain, joints): (&Chain<D>, Option<&[f64]>),
 ) {
     let id = OTHER_CHAIN + slot;
+    let arm = spec.arm.as_deref().zip(joints);
+    if let Some(links) = arm.and_then(|(arm, joints)| arm.enclosures(joints, id)) {
+        return parts.extend(links);
+    }
     let points = chain.points();
     let connectors = points.iter().zip(chain.connectors());
     parts.extend(connectors.map(|(at, connector)| Obstacle::ball(id, *at, connector.radius_m)));

@@ -8,10 +8,12 @@ use super::tasks::{complete_target, give_up_if_stuck, is_last_target};
 use super::{ChainCycleState, Initiator};
 use crate::driver::{TargetPath, Targets};
 use crate::events::EventKind;
+use crate::scratch::PositionBuffer;
 use crate::state::{ChainBodyState, MotionPlan};
 use crate::world::purpose;
+use sidestep_arms::Arm;
 use sidestep_arms::plan::{JointGoal, JointPosture, JointSpace, plan_line, plan_to_goal};
-use sidestep_rods::geometry::distance;
+use sidestep_rods::geometry::{Point, distance};
 
 /// Returns the move toward a goal of an arm's joints: along the path that is planned to it, from the first cycle on.
 pub(super) fn step_to_joint_goal<const D: usize>(
@@ -30,7 +32,8 @@ pub(super) fn step_to_joint_goal<const D: usize>(
         body.plan = None;
         // A line starts where the joints rest: on the way from elsewhere they would cut its corner.
         let stops = targets.path == TargetPath::Line || is_last_target(initiator, body, targets);
-        let is_near = !stops && goal.is_reached(arm, &acting.actual.joints);
+        let is_near =
+            !stops && passes(acting.actual, place, (arm, targets, goal), initiator.task.agent);
         if is_near || has_come_to_rest(body) {
             complete_target(initiator, acting);
         }
@@ -60,6 +63,19 @@ pub(super) fn step_to_joint_goal<const D: usize>(
     };
     acting.sink.record(&body.chain, kind, initiator.task.agent, value);
     if body.plan.is_some() { DesiredMove::Follow } else { DesiredMove::Rest }
+}
+
+/// Returns whether joints are as near to a goal that is not the last one as they have to come: at it, or the tool near
+/// its place, where that is enough.
+fn passes<const D: usize>(
+    actual: &PositionBuffer<D>,
+    place: Point<D>,
+    (arm, targets, goal): (&Arm, &Targets<D>, &JointGoal),
+    agent: usize,
+) -> bool {
+    let left_m = actual.points.get(agent).map(|tool| distance(*tool, place));
+    let blends = targets.blend_m.zip(left_m).is_some_and(|(blend_m, left_m)| left_m <= blend_m);
+    blends || goal.is_reached(arm, &actual.joints)
 }
 
 /// Plans a path of the joints from their reference to a goal.

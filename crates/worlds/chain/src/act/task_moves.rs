@@ -146,7 +146,7 @@ fn step_to_target<const D: usize>(
     let body = &mut *acting.body;
     body.plan = None;
     let is_last = is_last_target(initiator, body, targets);
-    let arrives = |at| !is_last && distance(at, target) <= targets.tolerance_m;
+    let arrives = |at| !is_last && distance(at, target) <= targets.passing_distance_m();
     if has_followed(body, acting.actual, arrives, initiator.task.agent) {
         complete_target(initiator, acting);
     }

@@ -16,7 +16,7 @@ const DEFAULT_TOLERANCE_RAD: f64 = 1e-3;
 
 impl<const D: usize> TaskSection<D> {
     /// Returns the keys that an arm's tool alone may have, and whether they are given.
-    fn tool_keys(&self) -> [(&'static str, bool); 6] {
+    fn tool_keys(&self) -> [(&'static str, bool); 7] {
         [
             ("rpy_rad", self.rpy_rad.is_some()),
             ("quaternions", self.quaternions.is_some()),
@@ -25,6 +25,7 @@ impl<const D: usize> TaskSection<D> {
             ("joints", self.joints.is_some()),
             // Any path is that of every chain.
             ("path", self.path == Some(PathWord::Line)),
+            ("blend_m", self.blend_m.is_some()),
         ]
     }
 
@@ -50,16 +51,25 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let Some((key, _)) = given else { return Ok(targets) };
         let Some(arm) = tool.arm.filter(|arm| tool.connector == arm.skeleton.rods.len()) else {
             let at = self.source.key_span(at, &[key]);
-            let cause =
-                "only the tool of an arm has orientations, lines and joint values as targets";
+            let cause = "only the tool of an arm has orientations, lines and joint values as targets, and passes some";
             let remedy = match tool.arm {
                 Some(arm) => format!("give connector = {}, the tool", arm.skeleton.rods.len()),
                 None => "give the chain arm = { urdf = \"FILE\" }, or leave this out".into(),
             };
             return Err(self.source.error(at, cause, remedy));
         };
+        if s.blend_m.is_some() && s.path == Some(PathWord::Line) {
+            let at = self.source.key_span(at, &["blend_m"]);
+            let cause = "a tool comes to rest at each end of a straight line";
+            return Err(self.source.error(at, cause, "leave blend_m or path out"));
+        }
         if let Some(values) = &s.joints {
             return self.joint_values(s, arm, values, at);
+        }
+        let only_blends =
+            s.tool_keys().iter().all(|(key, is_given)| !is_given || *key == "blend_m");
+        if only_blends {
+            return Ok(targets);
         }
         let path = match s.path {
             Some(PathWord::Line) => TargetPath::Line,
@@ -213,6 +223,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         places: Vec<sidestep_rods::geometry::Point<D>>,
     ) -> Targets<D> {
         let tolerance_m = s.tolerance_m.map_or(super::tasks::DEFAULT_TOLERANCE_M, f64::from);
-        Targets { places, tolerance_m, goals: Vec::new(), path: TargetPath::Any }
+        let blend_m = s.blend_m.map(f64::from);
+        Targets { places, tolerance_m, goals: Vec::new(), path: TargetPath::Any, blend_m }
     }
 }

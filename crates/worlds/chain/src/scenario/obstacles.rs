@@ -196,7 +196,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let ObstacleBuilder { still: mut all, movers, .. } = self.given_obstacles(site)?;
         all.extend(movers.iter().map(|mover| mover.at(0.0)));
         for (slot, spec) in (0..).zip(placed) {
-            push_part_obstacles(&mut all, slot, &spec.start);
+            push_part_obstacles(&mut all, slot, spec, spec.start_parts());
         }
         Ok(all)
     }

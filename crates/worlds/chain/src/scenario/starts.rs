@@ -4,7 +4,6 @@ use super::super::metrics::PENETRATION_THRESHOLD_M;
 use super::super::world::{ChainSpec, OTHER_CHAIN, push_part_obstacles};
 use super::obstacles::ScenarioObstacles;
 use super::{ChainScenarioCompiler, MIN_REACH_M};
-use sidestep_arms::Arm;
 use sidestep_kernel::{EntitySlot, InputError};
 use sidestep_rods::geometry::Aabb;
 use sidestep_rods::{Chain, Obstacle, Obstacles, RodBvh, nearest_own_parts};
@@ -34,11 +33,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let moving: Vec<_> = ground.movers.at(0.0).filter(Obstacle::is_in_range).collect();
         obstacles.replace_moving(&moving)?;
         for (slot, spec) in chains.iter().enumerate() {
-            let inside = match spec.arm.as_deref().filter(|arm| arm.body.is_some()) {
-                Some(arm) => deepest_link(arm, &obstacles),
-                None => deepest(&spec.start, &obstacles, None),
-            };
-            if let Some(inside) = inside {
+            if let Some(inside) = deepest_part(spec, &obstacles, None) {
                 return Err(self.start_overlap_error(
                     slot,
                     inside,
@@ -53,14 +48,14 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         // All chains are obstacles to all, each apart from its own parts, so that the grid of obstacles is built once.
         let mut parts = Vec::new();
         for (slot, spec) in (0..).zip(chains) {
-            push_part_obstacles(&mut parts, slot, &spec.start);
+            push_part_obstacles(&mut parts, slot, spec, spec.start_parts());
         }
         let rods = chains.iter().flat_map(|spec| spec.start.rods());
         let longest_m = rods.map(|rod| rod.max_m).fold(MIN_REACH_M, f64::max);
         let parts = Obstacles::new(parts, longest_m)?;
         for (slot, spec) in chains.iter().enumerate() {
             let own = OTHER_CHAIN + slot as EntitySlot;
-            if let Some(inside) = deepest(&spec.start, &parts, Some(own)) {
+            if let Some(inside) = deepest_part(spec, &parts, Some(own)) {
                 let other = format!("chain {}", inside.id - OTHER_CHAIN);
                 return Err(self.start_overlap_error(slot, inside, &other));
             }
@@ -114,13 +109,25 @@ pub(crate) fn own_overlap_text<const D: usize>(
     Some(format!("begins with its {one} {:.3e} m deep in its {other}", -nearest.gap_m))
 }
 
-/// Returns the link of an arm with shapes that is deepest in an obstacle.
-fn deepest_link<const D: usize>(arm: &Arm, obstacles: &Obstacles<D>) -> Option<StartOverlap> {
-    let body = arm.body.as_ref()?;
-    let contact = body.deepest_contact(arm.posture(&arm.values), obstacles, false)?;
-    let connector = arm.connector_of_link(contact.link);
-    let inside = StartOverlap { connector, id: contact.obstacle?, depth_m: contact.depth_m };
-    (inside.depth_m > PENETRATION_THRESHOLD_M).then_some(inside)
+/// Returns the part of a chain that is deepest in anything not called `own` at the start: of an arm with shapes a link.
+fn deepest_part<const D: usize>(
+    spec: &ChainSpec<D>,
+    obstacles: &Obstacles<D>,
+    own: Option<u32>,
+) -> Option<StartOverlap> {
+    let arm = spec.arm.as_deref();
+    let Some((arm, body)) = arm.and_then(|arm| Some((arm, arm.body.as_ref()?))) else {
+        return deepest(&spec.start, obstacles, own);
+    };
+    let contacts = body.contacts(arm.posture(&arm.values), obstacles, false);
+    let inside = contacts.into_iter().filter_map(|contact| {
+        let connector = arm.connector_of_link(contact.link);
+        Some(StartOverlap { connector, id: contact.obstacle?, depth_m: contact.depth_m })
+    });
+    let others = inside.filter(|inside| own != Some(inside.id));
+    let deep = others.filter(|inside| inside.depth_m > PENETRATION_THRESHOLD_M);
+    // Of equal depths that of the least id, as contacts come in the order in which obstacles are stored.
+    deep.min_by(|a, b| b.depth_m.total_cmp(&a.depth_m).then(a.id.cmp(&b.id)))
 }
 
 /// Returns the part of a chain that is deepest in anything not called `own`.

@@ -93,6 +93,8 @@ pub(super) struct TaskSection<const D: usize> {
     pub(super) joints: Option<Vec<Vec<f64>>>,
     /// The way from one target to the next.
     pub(super) path: Option<PathWord>,
+    /// Distance within which the tool of an arm passes the targets before the last one without coming to rest.
+    pub(super) blend_m: Option<PositiveNumber>,
     navigator: Option<Spanned<NavigatorSection>>,
     planner: Option<PlannerWord>,
     plans_after_s: Option<PositiveNumber>,
@@ -333,6 +335,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             ("tolerance_rad", s.tolerance_rad.is_some(), TaskKindWord::Targets),
             ("joints", s.joints.is_some(), TaskKindWord::Targets),
             ("path", s.path.is_some(), TaskKindWord::Targets),
+            ("blend_m", s.blend_m.is_some(), TaskKindWord::Targets),
             ("navigator", s.navigator.is_some(), TaskKindWord::Navigate),
             ("planner", s.planner.is_some(), TaskKindWord::Targets),
         ];

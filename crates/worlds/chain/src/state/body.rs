@@ -112,6 +112,11 @@ pub(crate) struct Standstill {
 }
 
 impl<const D: usize> ChainBodyState<D> {
+    /// Returns where it is, as [`push_part_obstacles`](crate::world::push_part_obstacles) takes it.
+    pub(crate) fn parts(&self) -> (&Chain<D>, Option<&[f64]>) {
+        (&self.chain, self.joints.as_deref())
+    }
+
     pub(crate) fn new(spec: &ChainSpec<D>) -> Result<Self, InputError> {
         let chain = spec.start.clone();
         let driving = TaskProgress::new(spec.tasks[0].agent, chain.points());

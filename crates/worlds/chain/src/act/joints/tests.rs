@@ -1,9 +1,13 @@
 //! Arms in runs: whatever they do, no joint leaves its limits or is faster than it may be, and the connectors are where
 //! the joints put them.
 
+mod blend;
+mod neighbors;
+
+use crate::driver::TaskKind;
 use crate::scenario::ChainScenario;
 use crate::world_impl::ChainRun;
-use sidestep_arms::kinematics::SerialChain;
+use sidestep_arms::kinematics::{ArmBody, SerialChain};
 use sidestep_import::urdf::Model;
 use sidestep_kernel::geometry::{distance, norm, normalized, perpendicular_component, sub};
 use sidestep_kernel::stream::{Draws, Purpose, Streams};
