@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
-"""Plans of arms: Sidestep beside RRT-Connect of OMPL, and beside VAMP where it knows the arm.
+"""Plans of arms: Sidestep beside RRT-Connect of OMPL.
 
     pip install ompl example-robot-data numpy
-    pip install vamp-planner                        # optional; it is compiled
-    python benches/planning/beside_ompl.py [--problems 100] [--arms ur5 panda iiwa14] [--seconds 10]
+    python benches/planning/beside_ompl.py [--problems 100] [--arms ur5 panda iiwa14] [--seconds 3]
 
 Each problem is an arm, a scene of balls, turned boxes and meshes within its reach, and two postures that touch nothing
 and between which the straight path of the joints is blocked. Both planners get the same postures and ask the same
@@ -13,9 +12,7 @@ search alone. OMPL plans with the defaults of its Python package (RRT-Connect, t
 `--seconds`; Sidestep with those of its runs, whose search ends after a number of samples. Times are CPU seconds of one
 thread, of OMPL those of the search itself and of the checks: what the crossing from C++ to Python costs is taken out,
 by measuring checks inside and outside of the module. The table counts the problems that any planner solves: of others
-nobody knows whether there is a path. Both paths are judged by checks of many postures on them. VAMP
-has a model of its own: balls that stand for the links, as its package holds them, obstacle meshes as balls around them;
-it stands here to compare times, not success.
+nobody knows whether there is a path. Both paths are judged by checks of many postures on them.
 """
 
 import argparse
@@ -50,13 +47,12 @@ JUDGED_STEP = 2e-3
 
 @dataclass
 class Arm:
-    """An arm of the comparison: its files, its tip, its reach in m, and its name in VAMP."""
+    """An arm of the comparison: its files, its tip, and its reach in m."""
 
-    urdf: str
+    urdf: Path
     tip: str
-    srdf: str | None
+    srdf: Path | None
     reach_m: float
-    vamp: str | None
 
 
 def models():
@@ -77,9 +73,9 @@ def arms(shared):
     ur = models() / "ur_description"
     panda = models() / "panda_description"
     return {
-        "ur5": Arm(ur / "urdf/ur5_robot.urdf", "tool0", ur / "srdf/ur5.srdf", 0.95, "ur5"),
-        "panda": Arm(panda / "urdf/panda.urdf", "panda_hand", panda / "srdf/panda.srdf", 0.95, "panda"),
-        "iiwa14": Arm(shared / "iiwa14_primitive_collision.urdf", "iiwa_link_7", None, 1.2, None),
+        "ur5": Arm(ur / "urdf/ur5_robot.urdf", "tool0", ur / "srdf/ur5.srdf", 0.95),
+        "panda": Arm(panda / "urdf/panda.urdf", "panda_hand", panda / "srdf/panda.srdf", 0.95),
+        "iiwa14": Arm(shared / "iiwa14_primitive_collision.urdf", "iiwa_link_7", None, 1.2),
     }
 
 
@@ -345,7 +341,7 @@ def main():
     options.add_argument("--problems", type=int, default=100, help="for each arm")
     options.add_argument("--arms", nargs="+", default=["ur5", "panda", "iiwa14"])
     options.add_argument("--shared", type=Path, default=ROOT.parent / "shared/data/urdf", help="folder of more arms")
-    options.add_argument("--seconds", type=float, default=10.0, help="time of OMPL for each problem")
+    options.add_argument("--seconds", type=float, default=3.0, help="time of OMPL for each problem")
     options.add_argument("--target", type=Path, default=ROOT / "target/bench-planning")
     given = options.parse_args()
     module = load(given.target)
