@@ -132,6 +132,13 @@ fn between_interiors<const D: usize>(
 /// Returns whether two plane segments cross: the ends of each are strictly on both sides of the other.
 #[inline]
 pub fn segments_cross<const D: usize>([p, q]: [Point<D>; 2], [a, b]: [Point<D>; 2]) -> bool {
+    // Of segments on one line the products below are rounding, of any sign, however far apart they are.
+    let is_apart = |axis: usize| {
+        p[axis].max(q[axis]) < a[axis].min(b[axis]) || a[axis].max(b[axis]) < p[axis].min(q[axis])
+    };
+    if is_apart(0) || is_apart(1) {
+        return false;
+    }
     let d1 = sub(q, p);
     let d2 = sub(b, a);
     cross_2d(d1, sub(a, p)) * cross_2d(d1, sub(b, p)) < 0.0
@@ -462,6 +469,22 @@ mod tests {
 
     fn point<const D: usize>() -> impl Strategy<Value = Point<D>> {
         proptest::array::uniform(-3.0..3.0f64)
+    }
+
+    #[test]
+    fn segments_of_one_line_that_are_apart_do_not_cross() {
+        // Two rods of a chain that is straight up to rounding.
+        let one = [
+            [-0.000_421_441_686_418_636_17, 0.599_999_851_989_069_2],
+            [-0.000_632_162_529_627_954_3, 0.899_999_777_983_603_8],
+        ];
+        let other = [
+            [-0.002_107_208_432_093_181_3, 2.999_999_259_945_346],
+            [-0.002_317_929_275_302_499_4, 3.299_999_185_939_880_5],
+        ];
+        assert!(!segments_cross(one, other));
+        assert!((between_segments(one, other).distance_m - 2.1).abs() < 1e-5);
+        assert!(segments_cross([[0.0, 0.0], [1.0, 1.0]], [[0.0, 1.0], [1.0, 0.0]]));
     }
 
     proptest! {
