@@ -27,6 +27,9 @@ pub struct ReactionRules {
     /// Longest move of any connector in one request that a fixed base answers, meters; infinite for
     /// no limit. Near singular postures the initiator goes only as far as that allows.
     pub joint_step_max_m: f64,
+    /// Longest move of any connector of a chain that nothing holds in one request, meters; infinite for no limit. Rods that
+    /// turn aside throw the parts that hang on them farther than the initiator goes, which then goes less far.
+    pub free_step_max_m: f64,
     /// Number of times that one sweep may try another direction for an earlier slave.
     pub backtracks: usize,
     /// Longest move of an initiator in one sub-step, meters. By default it is a quarter of the
@@ -41,6 +44,7 @@ impl Default for ReactionRules {
             self_collision: false,
             slave_step_max_m: f64::INFINITY,
             joint_step_max_m: f64::INFINITY,
+            free_step_max_m: f64::INFINITY,
             backtracks: 64,
             step_m: None,
         }

@@ -1,5 +1,7 @@
 //! Remarks on a valid scenario: effects that will surprise its author. `sidestep check` shows them.
 
+mod unreached;
+
 use super::scenario::ChainScenario;
 use super::scenario::own_overlap_text;
 use super::world::{ChainChangeKind, ChainSpec, ChainWorld};
@@ -26,8 +28,17 @@ pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark
     let overlaps = chains.clone().filter_map(|(k, spec)| exempt_overlaps_remark(k, spec));
     // Otherwise all links may touch.
     let overlaps = overlaps.filter(|_| compiled.world.rules.self_collision);
+    let unreached = chains
+        .clone()
+        .flat_map(|(k, spec)| unreached::unreached_targets_remarks(&compiled.world, k, spec));
     let of_arms = unlimited.chain(led_slowly).chain(overlaps);
-    of_files.chain(of_arms).chain(slow).chain(own_overlap).chain(unused_rules(compiled)).collect()
+    of_files
+        .chain(of_arms)
+        .chain(unreached)
+        .chain(slow)
+        .chain(own_overlap)
+        .chain(unused_rules(compiled))
+        .collect()
 }
 
 /// Returns a warning on chains whose own parts overlap at the start, where that is allowed.
@@ -66,12 +77,14 @@ fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<It
     let moves = !world.movers.is_empty();
     let holds = world.chains.iter().any(is_ever_held);
     let given = compiled.recipe.iter().flat_map(|recipe| recipe.given_rules());
-    let idle = given.filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds });
+    // Chains that nothing holds keep to the speed of escapes where obstacles move.
+    let idle =
+        given.filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds && moves });
     idle.map(|(key, of_movers)| {
         let why = if of_movers {
             "no obstacle moves: give one velocity_m_s or patrol_m"
         } else {
-            "no connector is held: give one a mobility"
+            "no connector is held and obstacles move: give a connector a mobility, or escape_speed_m_s for this"
         };
         Remark::note(
             format!("chain.{key}"),
@@ -242,7 +255,7 @@ mod tests {
         let [joints, by, speed, ahead] =
             ["joint_speed_m_s", "escape_by", "escape_speed_m_s", "escape_ahead_s"]
                 .map(|key| format!("chain.{key}"));
-        assert_eq!(keys_of(rules, ""), [&joints, &by, &speed, &ahead].map(String::clone));
+        assert_eq!(keys_of(rules, ""), [&by, &speed, &ahead].map(String::clone));
         let ball = "[[obstacles]]\nat_m = [9.0, 9.0]\nradius_m = 0.1\nvelocity_m_s = [0.1, 0.0]\n";
         assert_eq!(keys_of(rules, ball), [joints]);
         let held = "[[chains.limits]]\nconnector = 2\nmobility = \"fixed\"\n";

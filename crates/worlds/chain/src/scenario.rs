@@ -10,6 +10,7 @@ mod mobility;
 mod navigators;
 mod network;
 mod obstacles;
+mod reach;
 mod spec;
 mod starts;
 mod tasks;
@@ -428,7 +429,11 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         self.check_escapes(&chains, escape.as_ref())?;
         let joint_speed_m_s = self.joint_speed_m_s(&chains);
         let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
-        let rules = ReactionRules { slave_step_max_m, ..self.rules(joint_speed_m_s * dt_s) };
+        let joint_step_max_m = joint_speed_m_s * dt_s;
+        // Among obstacles that move the limit of escapes holds for all motions of a cycle.
+        let free_step_max_m = if escape.is_some() { f64::INFINITY } else { joint_step_max_m };
+        let rules =
+            ReactionRules { slave_step_max_m, free_step_max_m, ..self.rules(joint_step_max_m) };
         let network = self.network(dt_s, &chains)?;
         self.check_local_knowledge(&chains, &rules, escape.is_some())?;
         let world = ChainWorld {
@@ -500,8 +505,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         Err(self.source.unused_key(&format!("chain.{key}"), &format!("with escape = {because}")))
     }
 
-    /// Returns the greatest speed of the joints of chains with a fixed base, m/s; by default twice
-    /// that at which one is led.
+    /// Returns the greatest speed of any connector of a chain, m/s; by default twice that at which one is led.
     fn joint_speed_m_s(&self, chains: &[ChainSpec<D>]) -> f64 {
         let led = chains.iter().flat_map(|spec| &spec.tasks).map(|task| task.speed_m_s);
         let usual_m_s = FAST_FACTOR * led.fold(0.0, f64::max);
@@ -551,8 +555,9 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
                 ByName::BuiltIn(RotationWord::Never) => RotationRule::Never,
             },
             self_collision: section.self_collision.unwrap_or(true),
-            // Chosen by the caller, who knows all chains and the ground.
+            // These two are chosen by the caller, who knows all chains and the ground.
             slave_step_max_m: f64::INFINITY,
+            free_step_max_m: f64::INFINITY,
             joint_step_max_m,
             backtracks: section.backtracks.unwrap_or(ReactionRules::default().backtracks),
             step_m: section.step_m.map(f64::from),

@@ -69,11 +69,13 @@ fn robots_of_different_chains_never_overlap_however_far_they_lag() {
     }
 }
 
-/// A chain whose last connector is held, on its way to places that are too far for it, and maybe to one that is not.
+/// A chain whose last connector is held, on its way to places that are too far for it, and maybe to one that is not. The
+/// change has no effect; without one these places would be refused.
 fn held(targets_m: &str) -> String {
     format!(
         "seed = 1\ncycles = 2000\n[[chains]]\nconnectors = 3\nrod_m = 0.5\n\
          limits = [{{ connector = 2, mobility = \"fixed\" }}]\n\
+         changes = [{{ at_s = 0.02, connector = 2, mobility = \"fixed\" }}]\n\
          tasks = [{{ kind = \"targets\", targets_m = {targets_m}, planner = \"none\", patience_s = 1.0 }}]\n"
     )
 }

@@ -31,7 +31,8 @@ pub(crate) fn execute_request<const D: usize>(
         return propagator.propagate(chain, obstacles, request);
     };
     let Some(hold) = Hold::of_chain(chain) else {
-        return propagator.propagate(chain, obstacles, request);
+        let scene = &mut MotionEnvironment { propagator, obstacles };
+        return propagate_slowed(scene, chain, request, (k, to));
     };
     let order = ReachRequest { k, target: to, base: hold.connector, tolerance_m: TOLERANCE_M };
     let scene = &mut MotionEnvironment { propagator, obstacles };
@@ -39,6 +40,27 @@ pub(crate) fn execute_request<const D: usize>(
     try_slowed(chain, k, to, joints_m, |chain, before, target| {
         let order = ReachRequest { target, ..order };
         move_held_chain(scene, chain, before, &order, request)
+    })
+}
+
+/// Moves a chain that nothing holds by propagation, and its initiator less far where a rod that turns aside would throw
+/// some part too far.
+fn propagate_slowed<const D: usize>(
+    scene: &mut MotionEnvironment<'_, D>,
+    chain: &mut Chain<D>,
+    request: &MotionRequest<D>,
+    (k, to): (usize, Point<D>),
+) -> Result<MotionOutcome<D>, InputError> {
+    let most_m = scene.propagator.rules.free_step_max_m;
+    let can_turn = scene.propagator.rules.self_collision || !scene.obstacles.is_empty();
+    // Parts that are pushed or pulled go no farther than what moves them.
+    if !can_turn || most_m == f64::INFINITY {
+        return scene.propagator.propagate(chain, scene.obstacles, request);
+    }
+    try_slowed(chain, k, to, most_m, |chain, _, target| {
+        let motion = RequestedMotion::Connector { k, to: target };
+        let request = MotionRequest { motion, ..*request };
+        Ok((scene.propagator.propagate(chain, scene.obstacles, &request)?, f64::INFINITY))
     })
 }
 
@@ -145,7 +167,10 @@ fn try_slowed<const D: usize>(
             vetoed @ MotionOutcome::Vetoed(_) => return Ok(vetoed),
         };
         let most_m = joints_m.min(jump_m);
-        let (by, longest_m) = max_displacement(&before, chain.points());
+        let moved_range = moved.touched.start..moved.touched.end.min(before.len());
+        let (by, longest_m) =
+            max_displacement(&before[moved_range.clone()], &chain.points()[moved_range.clone()]);
+        let by = by + moved_range.start;
         if longest_m <= most_m {
             let cut_short = if fraction < 1.0 {
                 Some(speed_veto(k, by, chain.points()[k]))

@@ -244,8 +244,14 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let s = section.get_ref();
         let tasks = s.tasks.0.iter().map(|task| self.task(task, s.robots.is_some(), start, arm));
         let tasks = tasks.collect::<Result<Vec<_>, _>>()?;
+        // Of several chains each starts elsewhere, and changes may let go of a connector.
+        let is_held_for_good = s.count == 1 && !s.anywhere && s.changes.0.is_empty();
         for (section, task) in s.tasks.0.iter().zip(&tasks) {
             self.check_leader(s, section, task, start)?;
+            // The joints of an arm have told already.
+            if is_held_for_good && arm.is_none() {
+                self.check_reach(start, task, section.span())?;
+            }
         }
         if let Some(k) = tasks.iter().position(is_endless).filter(|k| k + 1 < tasks.len()) {
             let cause = "this task never ends, and others follow";

@@ -191,3 +191,75 @@ fn a_field_may_be_given_by_the_earlier_name_of_its_fill_fraction() {
     let words = ["earlier name of `fill_fraction`", "leave out `part`"];
     assert_refused(&field("part = 0.1\nfill_fraction = 0.1"), &words);
 }
+
+/// A chain of five rods of 0.3 m with one target, or one between two fixed ends whose middle has it.
+fn with_target(mobility: &str, target: &str) -> String {
+    format!(
+        "[[chains]]\nconnectors = 6\nat_m = [0.0, 1.5]\nalong = [0.0, -1.0]\nrod_m = 0.3\nradius_m = 0.02\n\
+         rod_radius_m = 0.01\nlimits = [{{ connector = 5, mobility = {mobility} }}]\n\
+         tasks = [{{ kind = \"targets\", targets_m = [[0.5, 0.5], {target}], tolerance_m = 0.01 }}]\n"
+    )
+}
+
+#[test]
+fn a_target_that_no_posture_reaches_is_refused_with_its_distance() {
+    let base = "\"fixed\"";
+    assert_valid(&with_target(base, "[0.0, 1.505]"));
+    let words = ["target 1, [0.0, 1.52]: it is 1.5200 m from connector 5", "5 rods reach 1.5000 m"];
+    assert_refused(&with_target(base, "[0.0, 1.52]"), &words);
+    assert_refused(
+        &with_target(base, "[0.0, 1.52]"),
+        &["give a target at most 1.5000 m from there"],
+    );
+    let rail = "{ on_segment = [[-1.0, 0.0], [1.0, 0.0]] }";
+    assert_valid(&with_target(rail, "[2.4, 0.2]"));
+    assert_refused(&with_target(rail, "[2.6, 0.2]"), &["1.6125 m from the segment of connector 5"]);
+    let line = "{ on_plane = { normal = [0.0, 1.0], offset_m = 0.0 } }";
+    assert_valid(&with_target(line, "[90.0, 1.4]"));
+    assert_refused(&with_target(line, "[90.0, -1.6]"), &["1.6000 m from the plane of connector 5"]);
+    let room = "{ in_box = [[-1.0, -0.5], [1.0, 0.0]] }";
+    assert_valid(&with_target(room, "[2.0, -1.0]"));
+    assert_refused(&with_target(room, "[2.2, -1.6]"), &["1.6279 m from the box of connector 5"]);
+    assert_valid(&with_target("\"free\"", "[90.0, 90.0]"));
+}
+
+#[test]
+fn a_target_in_the_hole_of_unequal_rods_is_refused() {
+    let near = |mobility: &str, target: &str| {
+        format!(
+            "[[chains]]\npoints_m = [[0, 0], [1.0, 0.0], [1.3, 0.0]]\nrod_m = 1.0\n\
+             limits = [{{ connector = 0, mobility = {mobility} }}]\n\
+             tasks = [{{ kind = \"targets\", connector = 1, targets_m = [{target}], tolerance_m = 0.01 }}]\n"
+        )
+        .replace("[1.3, 0.0]", "[2.0, 0.0]")
+    };
+    assert_valid(&near("\"fixed\"", "[0.0, -0.995]"));
+    assert_refused(
+        &near("\"fixed\"", "[0.0, 0.9]"),
+        &["0.9000 m from connector 0", "at least 1.0000 m"],
+    );
+    assert_valid(&near("{ on_segment = [[0.0, 0.0], [0.5, 0.0]] }", "[-0.5, 0.1]"));
+    let rail = "{ on_segment = [[0.0, 0.0], [0.5, 0.0]] }";
+    assert_refused(&near(rail, "[0.25, 0.9]"), &["0.9000 m from the segment", "at least 1.0000 m"]);
+    let room = "{ in_box = [[-0.1, 0.0], [0.5, 0.2]] }";
+    assert_refused(&near(room, "[0.2, 0.7]"), &["0.5000 m from the box", "at least 1.0000 m"]);
+}
+
+#[test]
+fn a_target_between_two_ends_is_refused_if_one_of_them_does_not_reach_it() {
+    let between = |target: &str, changes: &str| {
+        format!(
+            "[[chains]]\npoints_m = [[0, 0], [1, 0], [2, 1], [3, 1]]\nrod_m = [0.9, 1.5]\n{changes}\n\
+             limits = [{{ connector = 0, mobility = \"fixed\" }}, {{ connector = 3, mobility = \"fixed\" }}]\n\
+             tasks = [{{ kind = \"targets\", connector = 1, targets_m = [{target}], tolerance_m = 0.01 }}]\n"
+        )
+    };
+    assert_valid(&between("[1.2, 0.0]", ""));
+    assert_refused(
+        &between("[0.0, -1.3]", ""),
+        &["from connector 3, which is fixed", "2 rods reach 3.0000 m"],
+    );
+    // It may be let go before it is needed.
+    let change = "changes = [{ at_s = 1.0, connector = 3, mobility = \"free\" }]";
+    assert_valid(&between("[0.0, -1.3]", change));
+}

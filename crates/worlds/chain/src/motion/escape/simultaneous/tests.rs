@@ -14,6 +14,7 @@ const SOLID: ReactionRules = ReactionRules {
     self_collision: true,
     slave_step_max_m: f64::INFINITY,
     joint_step_max_m: f64::INFINITY,
+    free_step_max_m: f64::INFINITY,
     backtracks: 64,
     step_m: None,
 };
