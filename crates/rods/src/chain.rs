@@ -364,7 +364,7 @@ impl<const D: usize> Chain<D> {
     }
 
     /// Returns the greatest length of any rod, meters.
-    pub(super) fn max_rod_m(&self) -> f64 {
+    pub fn max_rod_m(&self) -> f64 {
         self.measures.max_rod_m
     }
 

@@ -46,6 +46,7 @@ pub use obstacle::{Obstacle, Obstacles, bounds_around, outline_walls};
 pub use own_body::{
     ChainPart, NearestOwnParts, find_own_passage, is_own_path_clear, nearest_own_parts, part_pairs,
 };
+pub use projection::ConstraintProjector;
 pub use propagate::{Propagator, local_solver};
 pub use reach::{ReachOutcome, ReachRequest, reach_target};
 pub use reaction::{MasterMove, Reaction};

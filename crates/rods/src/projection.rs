@@ -46,7 +46,7 @@ pub(super) enum ProjectionFailure {
 
 /// Projects postures onto the constraints of a chain; owns its buffers.
 #[derive(Debug, Clone, Default)]
-pub(super) struct ConstraintProjector<const D: usize> {
+pub struct ConstraintProjector<const D: usize> {
     /// Direction of each rod that is out of its limits, or of a fixed length; zero for others.
     directions: Vec<Point<D>>,
     /// Main diagonal, then pivots; side diagonal toward the rod before; errors of the lengths, then the solution.
@@ -58,11 +58,11 @@ pub(super) struct ConstraintProjector<const D: usize> {
     tree: RodBvh<D>,
 }
 
-/// The chain before the motion, and the connector that leads it.
+/// The chain before the motion, and the connector that leads it, if one does.
 #[derive(Clone, Copy)]
 struct ProjectionContext<'a, const D: usize> {
     chain: &'a Chain<D>,
-    k: usize,
+    k: Option<usize>,
 }
 
 impl<const D: usize> ProjectionContext<'_, D> {
@@ -74,7 +74,7 @@ impl<const D: usize> ProjectionContext<'_, D> {
     #[inline]
     fn free_part(&self, i: usize, push: Point<D>, at_limit: [bool; D]) -> Point<D> {
         let connector = self.connector(i);
-        if i == self.k || connector.is_still() {
+        if self.k == Some(i) || connector.is_still() {
             return [0.0; D];
         }
         match connector.mobility {
@@ -103,7 +103,7 @@ impl<const D: usize> ConstraintProjector<D> {
         k: usize,
         is_solid: bool,
     ) -> Result<(), ProjectionFailure> {
-        let context = ProjectionContext { chain, k };
+        let context = ProjectionContext { chain, k: Some(k) };
         let target = points[k];
         let settled = self.settle(context, points, is_solid);
         if settled != Err(ProjectionFailure::Lengths) {
@@ -126,6 +126,21 @@ impl<const D: usize> ConstraintProjector<D> {
             }
         }
         settled
+    }
+
+    /// Changes `points` to a posture near by in which rods have allowed lengths and, if `is_solid`, the chain's own parts
+    /// keep their distances, while connector `pinned` and those that are still stay where they are given; returns whether
+    /// there is one.
+    ///
+    /// `points` has one point for every connector.
+    pub fn correct_posture(
+        &mut self,
+        chain: &Chain<D>,
+        points: &mut [Point<D>],
+        pinned: Option<usize>,
+        is_solid: bool,
+    ) -> bool {
+        self.settle(ProjectionContext { chain, k: pinned }, points, is_solid).is_ok()
     }
 
     /// Corrects lengths and pushes parts apart in turn, until both are as they should be.
@@ -243,7 +258,7 @@ impl<const D: usize> ConstraintProjector<D> {
         points: &mut [Point<D>],
     ) {
         let connector = context.connector(i);
-        if i == context.k || connector.is_still() || connector.mobility == Mobility::Free {
+        if context.k == Some(i) || connector.is_still() || connector.mobility == Mobility::Free {
             return;
         }
         let wanted = points[i];

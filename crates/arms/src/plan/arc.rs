@@ -1,25 +1,20 @@
 //! Simple postures of a chain: straight ones, and arcs that end at a target.
 //!
-//! A chain that is caught in its own body gets out of it by uncurling, and to a target by curling up again: from any
-//! straight posture every arc can be reached without the chain meeting itself. So they are worth a try before any
-//! random postures.
+//! From any straight posture every arc can be reached without the chain meeting itself. A chain between two fixed ends
+//! reaches a target by two arcs, one from each end.
 
 use super::space::ChainConfigurationSpace;
 use super::{ChainPosture, ConfigurationSpace, PlanningQuery};
 use sidestep_kernel::math;
 use sidestep_rods::Mobility;
 use sidestep_rods::geometry::{
-    Point, add, add_scaled, angle_between_rad, distance, dot, lerp, norm, normalized,
-    perpendicular, scaled, sub, unit_x,
+    Point, add, add_scaled, distance, lerp, norm, normalized, perpendicular, scaled, sub, unit_x,
 };
 use std::f64::consts::TAU;
 
 /// Distances of the root from the target, in lengths of the chain between them, of which arcs are tried: from gentle
 /// ones, which meet nothing of themselves, to half circles and more.
 const ARC_REACHES: [f64; 4] = [0.9, 0.7, 0.4, 0.15];
-/// Steps in which a chain uncurls: in each its rods turn by a tenth of all its bends, little enough to go straight from
-/// one posture to the next.
-const UNCURL_STEPS: usize = 10;
 /// Bisections that find the bend of an arc, and the place of the root: to less than rounding.
 const BISECTIONS: usize = 60;
 
@@ -27,6 +22,9 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
     /// Returns postures at the target: arcs to both sides, from several places of the root, the gentlest first. Some
     /// may be in obstacles, or in the chain itself.
     pub(super) fn arc_postures(&self, query: &PlanningQuery<D>) -> Vec<ChainPosture<D>> {
+        if let Some(end) = self.far_end() {
+            return self.two_arc_postures(query.target, end);
+        }
         let mut postures = Vec::new();
         for root_at in self.root_places(query) {
             let across = perpendicular(normalized(sub(query.target, root_at)).unwrap_or(unit_x()));
@@ -37,52 +35,42 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         postures
     }
 
-    /// Returns postures on the way to a straight one, and straight ones: the chain as it uncurls about its root, all
-    /// bends by the same share at once; then straight, across that direction to either side, and toward the target.
-    pub(super) fn uncurling_postures(&self, query: &PlanningQuery<D>) -> Vec<ChainPosture<D>> {
-        let shares = (0..UNCURL_STEPS).rev().map(|step| step as f64 / UNCURL_STEPS as f64);
-        let mut postures: Vec<_> = shares.map(|share| self.unbent_posture(share)).collect();
+    /// Returns postures of a chain between two fixed ends whose initiator is at a place: an arc from each end to there, to all
+    /// sides.
+    pub(super) fn two_arc_postures(&self, place: Point<D>, end: usize) -> Vec<ChainPosture<D>> {
+        let limb: Vec<usize> = (self.root()..=end).collect();
+        let [before, after] = [self.root()..=self.initiator(), self.initiator()..=end]
+            .map(|part| self.mean_lengths_m(part));
         let root_at = self.chain().points()[self.root()];
-        let first = self.lead_direction();
-        let across = perpendicular(first);
-        let toward = normalized(sub(query.target, root_at)).unwrap_or(first);
-        for u in [across, scaled(across, -1.0), toward] {
-            postures.push(self.bent_posture(root_at, [u, perpendicular(u)], 0.0));
+        let end_at = self.chain().points()[end];
+        let mut postures = Vec::new();
+        for side in sides(sub(place, root_at)) {
+            let Some(first) = Arc::between([root_at, place], side, &before) else { continue };
+            for other_side in sides(sub(end_at, place)) {
+                let Some(second) = Arc::between([place, end_at], other_side, &after) else {
+                    continue;
+                };
+                let mut posture = self.present_posture();
+                let ends = first.rod_ends(&before).into_iter().chain(second.rod_ends(&after));
+                for (k, at) in limb[1..].iter().zip(ends) {
+                    posture[*k] = at;
+                }
+                // Rounding of the arcs, which end beside the other fixed end.
+                postures.extend(self.closed_posture(posture));
+            }
         }
         postures
     }
 
-    /// Returns the direction of the first rod toward the initiator.
-    fn lead_direction(&self) -> Point<D> {
-        let points = self.chain().points();
-        let next = if self.initiator() > self.root() { self.root() + 1 } else { self.root() - 1 };
-        normalized(sub(points[next], points[self.root()])).unwrap_or(unit_x())
+    /// Returns a posture whose rods all have one direction, from a place of the root; behind the root they go on.
+    pub(super) fn straight_posture(&self, root_at: Point<D>, u: Point<D>) -> ChainPosture<D> {
+        self.bent_posture(root_at, [u, perpendicular(u)], 0.0)
     }
 
-    /// Returns the present posture with only a share of each bend, about the same root and first rods.
-    fn unbent_posture(&self, share: f64) -> ChainPosture<D> {
-        let points = self.chain().points();
-        let mut posture = self.present_posture();
-        for limb in self.limbs() {
-            let direction = |pair: &[usize]| {
-                normalized(sub(points[pair[1]], points[pair[0]])).unwrap_or(unit_x())
-            };
-            // What the bends so far have turned the rest of the limb by, as the images of the axes.
-            let mut turned: [Point<D>; D] =
-                std::array::from_fn(|axis| std::array::from_fn(|i| f64::from(u8::from(i == axis))));
-            let mut before: Option<Point<D>> = None;
-            for pair in limb.windows(2) {
-                let was = direction(pair);
-                let kept = before.map_or(was, |before| part_of_turn(before, was, share));
-                let u = normalized(image(&turned, kept)).unwrap_or(unit_x());
-                let from = image(&turned, was);
-                turned = turned.map(|axis| rotated(axis, from, u));
-                before = Some(was);
-                let length_m = distance(points[pair[0]], points[pair[1]]);
-                posture[pair[1]] = add_scaled(posture[pair[0]], u, length_m);
-            }
-        }
-        posture
+    /// Returns the direction of the first rod of a posture toward the initiator.
+    pub(super) fn lead_direction(&self, posture: &ChainPosture<D>) -> Point<D> {
+        let next = if self.initiator() > self.root() { self.root() + 1 } else { self.root() - 1 };
+        normalized(sub(posture[next], posture[self.root()])).unwrap_or(unit_x())
     }
 
     /// Returns places of the root from which arcs are tried.
@@ -132,36 +120,8 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         target: Point<D>,
         across: Point<D>,
     ) -> Option<ChainPosture<D>> {
-        let rods = self.rods_to_initiator();
-        let chord_m = distance(root_at, target);
-        let arc_chord_m = |bend_rad: f64| {
-            let ends = rods.iter().enumerate().fold([0.0; 2], |[x, y], (j, length_m)| {
-                let direction_rad = j as f64 * bend_rad;
-                [x + length_m * math::cos(direction_rad), y + length_m * math::sin(direction_rad)]
-            });
-            (norm(ends), ends)
-        };
-        if arc_chord_m(0.0).0 < chord_m {
-            return None;
-        }
-        let [mut straight_rad, mut bent_rad] = [0.0, TAU / rods.len().max(2) as f64];
-        for _ in 0..BISECTIONS {
-            let middle_rad = 0.5 * (straight_rad + bent_rad);
-            if arc_chord_m(middle_rad).0 > chord_m {
-                straight_rad = middle_rad;
-            } else {
-                bent_rad = middle_rad;
-            }
-        }
-        let (_, [x, y]) = arc_chord_m(bent_rad);
-        let toward = normalized(sub(target, root_at)).unwrap_or(unit_x());
-        // The first rod points beside the chord by the angle under which the arc's end is seen from it.
-        let beside_rad = math::atan2(y, x);
-        let c = math::cos(beside_rad);
-        let s = math::sin(beside_rad);
-        let first = add(scaled(toward, c), scaled(across, -s));
-        let second = add(scaled(toward, s), scaled(across, c));
-        Some(self.bent_posture(root_at, [first, second], bent_rad))
+        let arc = Arc::between([root_at, target], across, &self.rods_to_initiator())?;
+        Some(self.bent_posture(root_at, arc.axes, arc.bend_rad))
     }
 
     /// Returns a posture whose rods from the root to the initiator bend by the same angle at each connector, from the
@@ -191,23 +151,78 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
     }
 }
 
-/// Returns the direction at a share of the turn from one unit vector to another.
-fn part_of_turn<const D: usize>(from: Point<D>, to: Point<D>, share: f64) -> Point<D> {
-    let turn_rad = share * angle_between_rad(from, to);
-    let across = normalized(add_scaled(to, from, -dot(from, to))).unwrap_or(perpendicular(from));
-    add(scaled(from, math::cos(turn_rad)), scaled(across, math::sin(turn_rad)))
+/// Rods that bend by the same angle at each connector.
+struct Arc<const D: usize> {
+    from: Point<D>,
+    /// The direction of the first rod, and that across it toward which the next ones turn.
+    axes: [Point<D>; 2],
+    bend_rad: f64,
 }
 
-/// Returns the image of a vector under a linear map, which is given by the images of the axes.
-fn image<const D: usize>(axes: &[Point<D>; D], v: Point<D>) -> Point<D> {
-    (0..D).fold([0.0; D], |sum, axis| add_scaled(sum, axes[axis], v[axis]))
+impl<const D: usize> Arc<D> {
+    /// Returns the arc of rods from one place to another, which bulges away from a direction across; none if the rods do not
+    /// reach.
+    fn between([from, to]: [Point<D>; 2], across: Point<D>, lengths_m: &[f64]) -> Option<Self> {
+        let chord_m = distance(from, to);
+        let arc_chord_m = |bend_rad: f64| {
+            let ends = lengths_m.iter().enumerate().fold([0.0; 2], |[x, y], (j, length_m)| {
+                let direction_rad = j as f64 * bend_rad;
+                [x + length_m * math::cos(direction_rad), y + length_m * math::sin(direction_rad)]
+            });
+            (norm(ends), ends)
+        };
+        if arc_chord_m(0.0).0 < chord_m {
+            return None;
+        }
+        let [mut straight_rad, mut bent_rad] = [0.0, TAU / lengths_m.len().max(2) as f64];
+        for _ in 0..BISECTIONS {
+            let middle_rad = 0.5 * (straight_rad + bent_rad);
+            if arc_chord_m(middle_rad).0 > chord_m {
+                straight_rad = middle_rad;
+            } else {
+                bent_rad = middle_rad;
+            }
+        }
+        let (_, [x, y]) = arc_chord_m(bent_rad);
+        let toward = normalized(sub(to, from)).unwrap_or(unit_x());
+        // The first rod points beside the chord by the angle under which the arc's end is seen from it.
+        let beside_rad = math::atan2(y, x);
+        let c = math::cos(beside_rad);
+        let s = math::sin(beside_rad);
+        let first = add(scaled(toward, c), scaled(across, -s));
+        let second = add(scaled(toward, s), scaled(across, c));
+        Some(Self { from, axes: [first, second], bend_rad: bent_rad })
+    }
+
+    /// Returns the ends of its rods.
+    fn rod_ends(&self, lengths_m: &[f64]) -> Vec<Point<D>> {
+        let mut at = self.from;
+        let rods = lengths_m.iter().enumerate();
+        rods.map(|(j, length_m)| {
+            let direction_rad = j as f64 * self.bend_rad;
+            let u = add(
+                scaled(self.axes[0], math::cos(direction_rad)),
+                scaled(self.axes[1], math::sin(direction_rad)),
+            );
+            at = add_scaled(at, u, *length_m);
+            at
+        })
+        .collect()
+    }
 }
 
-/// Turns a vector by the rotation that takes one unit vector to another in their plane.
-fn rotated<const D: usize>(v: Point<D>, from: Point<D>, to: Point<D>) -> Point<D> {
-    let middle = add(from, to);
-    // Opposite vectors have no plane of their own; a chain does not bend by half a turn.
-    let scale = 1.0 / (1.0 + dot(from, to)).max(f64::MIN_POSITIVE);
-    let off_middle = add_scaled(v, middle, -scale * dot(middle, v));
-    add_scaled(off_middle, to, 2.0 * dot(from, v))
+/// Returns directions across another: to both sides in the plane, and four in space.
+fn sides<const D: usize>(along: Point<D>) -> Vec<Point<D>> {
+    let u = normalized(along).unwrap_or(unit_x());
+    let mut sides = Vec::new();
+    let first = perpendicular(u);
+    sides.extend([first, scaled(first, -1.0)]);
+    if D == 3 {
+        let second: Point<D> = std::array::from_fn(|i| {
+            let [j, k] = [(i + 1) % D, (i + 2) % D];
+            u[j] * first[k] - u[k] * first[j]
+        });
+        sides.extend([second, scaled(second, -1.0)]);
+    }
+    sides
 }

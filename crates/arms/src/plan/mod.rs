@@ -1,13 +1,16 @@
-//! Motion planning for chains that are free or held at one connector: a path among obstacles, and out of the chain's
+//! Motion planning for chains that are free, held at one connector, or led between two fixed ones: a path among obstacles, and out of the chain's
 //! own way, from the present posture to one that reaches a target, where no local rule finds one.
 //!
 //! ```text
-//! space.rs:  postures of rods, the straight path between two, and whether it is free
-//! arc.rs:    straight postures and arcs, through which most paths lead
-//! joints.rs: the same for the joints of an arm
-//! goals.rs:  poses of its tool, values of its joints, and straight lines of its tool
+//! space.rs:    postures of rods, the straight path between two, and whether it is free
+//! own_path.rs: whether the parts of a chain stay apart on it
+//! arc.rs:      straight postures and arcs
+//! unfold.rs:   how a chain gets out of its own body
+//! retract.rs:  ways that unfold, turn, and curl up at the target; most paths are such
+//! joints.rs:   postures of the joints of an arm
+//! goals.rs:    poses of its tool, values of its joints, and straight lines of its tool
 //! shortcuts.rs: shorter paths of joints
-//! tree.rs:   two trees of postures that grow toward each other (RRT-Connect), and shortcuts
+//! tree.rs:     two trees of postures that grow toward each other (RRT-Connect), and shortcuts
 //! ```
 //!
 //! Source: Kuffner and LaValle, "RRT-Connect: an efficient approach to single-query path planning",
@@ -16,11 +19,14 @@
 mod arc;
 mod goals;
 mod joints;
+mod own_path;
+mod retract;
 mod shortcuts;
 mod space;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod unfold;
 
 use super::ik::{ChainIkGoal, IkEngine, IkSolver};
 pub use goals::{JointGoal, plan_line, plan_to_goal};
@@ -29,7 +35,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, ReactionRules};
-pub use space::ChainConfigurationSpace;
+pub use space::{ChainConfigurationSpace, HeldEnds, held_ends};
 
 /// Largest number of postures at the target from which the second tree grows: some may be cut off from the present
 /// one, and all of them cost searches.
@@ -39,6 +45,10 @@ const MAX_GOALS: usize = 4;
 const MAX_SEARCHES: usize = 12;
 /// Random postures that trees grow toward, at most.
 const MAX_SAMPLES: usize = 2_000;
+/// How much longer than others a piece of a path that is followed may be, as a factor.
+const MAX_REFINED_STEPS: f64 = 2.0;
+/// Pieces of a straight path at most.
+const MAX_PIECES: usize = 10_000;
 /// Restarts of one search; few, because the next search from another posture is worth more.
 const MAX_RESTARTS: usize = 25;
 
@@ -107,10 +117,32 @@ pub fn plan<const D: usize>(
 ) -> Result<Option<Vec<ChainPosture<D>>>, InputError> {
     let space = ChainConfigurationSpace::new(chain, obstacles, rules.self_collision, query.k)?;
     let goals = goals(&space, rules, query, draws)?;
-    let mut vias = space.uncurling_postures(query);
-    vias.retain(|posture| space.is_free(posture));
-    let path = find_path(&space, vias, goals, draws);
+    // A chain between two ends is led to a target, where no arcs lead.
+    if goals.is_empty() && space.far_end().is_none() {
+        return Ok(None);
+    }
+    let present = space.present_posture();
+    let path = match goals.iter().find(|goal| space.is_path_free(&present, goal)) {
+        Some(goal) => Some(vec![goal.clone()]),
+        None => {
+            let trail = space.retraction(&present);
+            let simple_path = retract::find_simple_path(&space, &trail, &goals, query.target);
+            let path = simple_path.map(|path| shorten_from_present(&space, path, draws));
+            path.or_else(|| find_path(&space, trail, goals, draws))
+        }
+    };
     Ok(path.map(|path| refined_path(&space, path)))
+}
+
+/// Returns a path without what shortcuts leave out.
+fn shorten_from_present<const D: usize>(
+    space: &ChainConfigurationSpace<'_, D>,
+    path: Vec<ChainPosture<D>>,
+    draws: &mut Draws,
+) -> Vec<ChainPosture<D>> {
+    let mut whole = vec![space.present_posture()];
+    whole.extend(path);
+    tree::shorten_path(space, whole, draws)
 }
 
 /// Returns a path with postures so near each other that it does not matter from which of them the rest is followed:
@@ -123,13 +155,33 @@ fn refined_path<const D: usize>(
     let mut refined = Vec::new();
     let mut from = space.present_posture();
     for to in path {
-        let n = (space.distance_m(&from, &to) / space.refined_step_m()).ceil().max(1.0) as usize;
-        for step in 1..=n {
-            refined.push(space.interpolate(&from, &to, step as f64 / n as f64));
-        }
+        refined.extend(refined_piece(space, &from, &to));
         from = to;
     }
     refined
+}
+
+/// Returns postures on the straight path after one posture up to another, each near the one before.
+fn refined_piece<const D: usize>(
+    space: &ChainConfigurationSpace<'_, D>,
+    from: &ChainPosture<D>,
+    to: &ChainPosture<D>,
+) -> Vec<ChainPosture<D>> {
+    let step_m = space.refined_step_m();
+    let mut n = (space.distance_m(from, to) / step_m).ceil().max(1.0) as usize;
+    loop {
+        // Where the projection onto two ends finds no posture, the path goes on straight to the next one.
+        let posture_at = |step| space.posture_between(from, to, step as f64 / n as f64);
+        let pieces: Vec<_> = (1..=n).filter_map(posture_at).collect();
+        let starts = std::iter::once(from).chain(&pieces);
+        let longest_m =
+            starts.zip(&pieces).map(|(a, b)| space.distance_m(a, b)).fold(0.0, f64::max);
+        // A chain that swings out and back goes farther than its ends tell.
+        if longest_m <= MAX_REFINED_STEPS * step_m || n > MAX_PIECES {
+            return pieces;
+        }
+        n *= 2;
+    }
 }
 
 /// Plans a path of an arm to a target, as [`plan`] does: the joint values after the present ones.
@@ -156,18 +208,18 @@ pub fn plan_path<S: ConfigurationSpace>(
     find_path(space, Vec::new(), vec![goal], draws)
 }
 
-/// Returns the shortened path to one of the goals, if there is any, perhaps through one of the postures on the way that are
-/// worth a try.
+/// Returns the shortened path to one of the goals, if there is any. `trail` is a path from the present posture to begin
+/// with.
 fn find_path<S: ConfigurationSpace>(
     space: &S,
-    vias: Vec<S::Posture>,
+    trail: Vec<S::Posture>,
     goals: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Option<Vec<S::Posture>> {
     if goals.is_empty() {
         return None;
     }
-    let path = tree::find_path(space, vias, goals, draws)?;
+    let path = tree::find_path(space, trail, goals, draws)?;
     Some(tree::shorten_path(space, path, draws))
 }
 
@@ -182,8 +234,8 @@ fn goals<const D: usize>(
     let mut goals = space.arc_postures(query);
     goals.retain(|posture| space.is_free(posture));
     goals.truncate(MAX_GOALS);
-    // A root that may move finds a place from which an arc leads to the target.
-    if !space.is_root_still() && !goals.is_empty() {
+    // A root that may move finds a place from which an arc leads to the target, and the search knows of no second base.
+    if !space.is_root_still() && !goals.is_empty() || space.far_end().is_some() {
         return Ok(goals);
     }
     let mut solver = IkSolver::new(rules);

@@ -1,23 +1,30 @@
 //! Postures of a chain, and the straight path between two.
 
+use super::own_path::{OwnPath, longest_move_m};
 use super::{ChainPosture, ConfigurationSpace, MAX_SAMPLES};
 use crate::ik::constraints::ConstraintChecker;
 use sidestep_kernel::distr::normal;
 use sidestep_kernel::stream::Draws;
 use sidestep_kernel::{InputError, interrupt};
 use sidestep_rods::geometry::{
-    Point, add, add_scaled, distance, lerp, norm, norm_squared, normalized, scaled, sub, unit_x,
+    Point, add, add_scaled, lerp, norm, norm_squared, normalized, scaled, sub, unit_x,
 };
-use sidestep_rods::{Chain, Connector, Mobility, Obstacles};
+use sidestep_rods::{Chain, Connector, ConstraintProjector, Mobility, Obstacles};
+use std::cell::RefCell;
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 /// The postures of one chain among obstacles. A posture is the place of one connector, the root, and the directions and
-/// lengths of all rods from there outward. The root is the connector that is held, or an end of a free chain.
+/// lengths of all rods from there outward. The root is the connector that is held, or an end of a free chain. Between two
+/// fixed connectors it is the lower one, and rods are projected so that the chain ends at the other.
 pub struct ChainConfigurationSpace<'a, const D: usize> {
     checker: ConstraintChecker<'a, D>,
     /// The connectors from the root outward, to one end of the chain or to both.
     limbs: Vec<Vec<usize>>,
     root: usize,
+    /// The other fixed connector of a chain that is led between two.
+    far_end: Option<usize>,
+    projector: RefCell<ConstraintProjector<D>>,
     k: usize,
     /// Longest move of a connector between two postures that are checked, meters.
     step_m: f64,
@@ -27,7 +34,7 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
     /// Returns the postures to which connector `k` can bring a chain.
     ///
     /// # Errors
-    /// When the chain has no rods, or is held at several connectors that would all have to move or to stay.
+    /// When the chain has no rods, or is held at several connectors one of which would have to move.
     pub fn new(
         chain: &'a Chain<D>,
         obstacles: &'a Obstacles<D>,
@@ -39,36 +46,25 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
             let remedy = "set planner = \"none\", or give two connectors or more";
             return Err(InputError::new("planner", "a chain without rods has no postures", remedy));
         }
-        let connectors = chain.connectors();
-        let is_held = |c: &Connector<D>| c.failed || c.mobility != Mobility::Free;
-        let below = (0..k).rev().find(|&i| is_held(&connectors[i]));
-        let above = (k + 1..n).find(|&i| is_held(&connectors[i]));
-        let root = match (below, above) {
-            (Some(root), None) | (None, Some(root)) => root,
-            // The end that is farther away swings about the nearer part.
-            (None, None) => {
-                if 2 * k < n {
-                    n - 1
-                } else {
-                    0
-                }
+        let ends = held_ends(chain, k).map_err(|[low, high]| held_twice_error(low, high))?;
+        let up = |from: usize, to: usize| (from..=to).collect::<Vec<usize>>();
+        let down = |from: usize| (0..=from).rev().collect::<Vec<usize>>();
+        let (root, far_end, limbs) = match ends {
+            HeldEnds::Two([low, high]) => (low, Some(high), vec![up(low, high)]),
+            HeldEnds::One(root) if chain.connectors()[root].is_still() => {
+                // What lies behind a base stays where it is.
+                (root, None, vec![if root < k { up(root, n - 1) } else { down(root) }])
             }
-            (Some(low), Some(high)) => return Err(held_twice_error(low, high)),
+            HeldEnds::One(root) => (root, None, vec![up(root, n - 1), down(root)]),
+            // The end that is farther away swings about the nearer part.
+            HeldEnds::None => {
+                let root = if 2 * k < n { n - 1 } else { 0 };
+                (root, None, vec![up(root, n - 1), down(root)])
+            }
         };
-        let up: Vec<usize> = (root..n).collect();
-        let down: Vec<usize> = (0..=root).rev().collect();
-        let limbs = match (connectors[root].is_still(), root < k) {
-            // What lies behind a base stays where it is.
-            (true, true) => vec![up],
-            (true, false) => vec![down],
-            (false, _) => vec![up, down],
-        };
-        let moves = |i: &&usize| **i != root && is_held(&connectors[**i]) && **i != k;
-        if let Some(other) = limbs.iter().flatten().find(moves) {
-            return Err(held_twice_error(root, *other));
-        }
         let checker = ConstraintChecker { chain, obstacles, self_collision };
-        Ok(Self { checker, limbs, root, k, step_m: chain.step_m() })
+        let projector = RefCell::default();
+        Ok(Self { checker, limbs, root, far_end, projector, k, step_m: chain.step_m() })
     }
 
     pub(super) fn chain(&self) -> &'a Chain<D> {
@@ -85,6 +81,11 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
 
     pub(super) fn is_root_still(&self) -> bool {
         self.chain().connectors()[self.root].is_still()
+    }
+
+    /// Returns the other fixed connector of a chain that is led between two.
+    pub(super) fn far_end(&self) -> Option<usize> {
+        self.far_end
     }
 
     pub(super) fn initiator(&self) -> usize {
@@ -104,6 +105,12 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
     pub(super) fn mean_length_m(&self, i: usize, j: usize) -> f64 {
         let rod = self.chain().rod_between(i, j);
         0.5 * (rod.min_m + rod.max_m)
+    }
+
+    /// Returns the mean lengths of the rods between connectors, meters.
+    pub(super) fn mean_lengths_m(&self, connectors: RangeInclusive<usize>) -> Vec<f64> {
+        let rods = *connectors.start()..*connectors.end();
+        rods.map(|rod| self.mean_length_m(rod, rod + 1)).collect()
     }
 
     /// Returns the mean lengths of the rods from the root to the initiator, meters.
@@ -129,6 +136,76 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
         posture
     }
 
+    /// Returns the length of the longest rod, meters.
+    pub(super) fn longest_rod_m(&self) -> f64 {
+        self.chain().max_rod_m()
+    }
+
+    /// Returns whether nothing but the chain's own body can block a straight path: postures between two that keep all
+    /// other constraints keep them as well.
+    fn is_own_body_alone(&self) -> bool {
+        let has_bend_limit = self.chain().connectors().iter().any(|c| c.max_bend_rad < PI);
+        self.obstacles().is_empty() && !has_bend_limit
+    }
+
+    /// Returns the posture at a fraction of the straight path; none if the chain does not reach its other fixed end in
+    /// between.
+    pub(super) fn posture_between(
+        &self,
+        a: &ChainPosture<D>,
+        b: &ChainPosture<D>,
+        fraction: f64,
+    ) -> Option<ChainPosture<D>> {
+        if fraction >= 1.0 {
+            return Some(b.clone());
+        }
+        let mut posture = a.clone();
+        if !self.is_root_still() {
+            posture[self.root] = lerp(a[self.root], b[self.root], fraction);
+        }
+        for pair in self.limbs().flat_map(|limb| limb.windows(2)) {
+            let [inner, outer] = [pair[0], pair[1]];
+            let [from, to] = [a, b].map(|points| sub(points[outer], points[inner]));
+            let [from_m, to_m] = [norm(from), norm(to)];
+            let mean = lerp(scaled(from, 1.0 / from_m), scaled(to, 1.0 / to_m), fraction);
+            // Opposite directions have no mean; just beside it they turn one way or the other.
+            let u = normalized(mean).or(normalized(from)).unwrap_or(unit_x());
+            posture[outer] = add_scaled(posture[inner], u, from_m + fraction * (to_m - from_m));
+        }
+        self.closed_posture(posture)
+    }
+
+    /// Returns a posture near one in which rods have allowed lengths and the chain's own parts are apart, if there is one.
+    /// Connector `pinned` stays.
+    pub(super) fn settled_posture(
+        &self,
+        mut posture: ChainPosture<D>,
+        pinned: Option<usize>,
+    ) -> Option<ChainPosture<D>> {
+        let mut projector = self.projector.borrow_mut();
+        let is_solid = self.checker.self_collision;
+        // What is left of overlaps after one round of pushes is less for the next.
+        let is_settled = (0..MAX_SETTLE_ROUNDS)
+            .any(|_| projector.correct_posture(self.chain(), &mut posture, pinned, is_solid));
+        is_settled.then_some(posture)
+    }
+
+    /// Returns a posture near one whose rods are laid out from the root, so that it ends at the other fixed end, if there is
+    /// one; none if the rods do not reach it.
+    pub(super) fn closed_posture(&self, mut posture: ChainPosture<D>) -> Option<ChainPosture<D>> {
+        let Some(end) = self.far_end else { return Some(posture) };
+        let end_at = self.chain().points()[end];
+        let missing = sub(end_at, posture[end]);
+        let rods = (end - self.root) as f64;
+        // Each rod gets an even share of what is missing, so that the projection has little to correct.
+        for (rod, k) in (self.root + 1..end).enumerate() {
+            posture[k] = add_scaled(posture[k], missing, (rod + 1) as f64 / rods);
+        }
+        posture[end] = end_at;
+        let mut projector = self.projector.borrow_mut();
+        projector.correct_posture(self.chain(), &mut posture, None, false).then_some(posture)
+    }
+
     /// Returns a random place of the root: within reach of the present one, where its mobility allows it.
     fn sample_root(&self, draws: &mut Draws) -> Point<D> {
         let present = self.chain().points()[self.root];
@@ -141,10 +218,46 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
     }
 }
 
-fn held_twice_error(one: usize, other: usize) -> InputError {
-    let [low, high] = [one.min(other), one.max(other)];
-    let cause = format!("the chain is held at connectors {low} and {high}");
-    InputError::new("planner", cause, "hold one connector at most, or set planner = \"none\"")
+/// The connectors that hold a chain where one of its connectors is led.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeldEnds {
+    /// None: the chain is free.
+    None,
+    /// The one on which the chain hangs.
+    One(usize),
+    /// The fixed ones on both sides of the connector that is led.
+    Two([usize; 2]),
+}
+
+/// Returns the connectors that hold a chain where connector `k` is led.
+///
+/// # Errors
+/// Two of them, the lower one first, if paths of the chain cannot be planned: those that are held, or have failed, on both
+/// sides of `k` must be fixed; on one side another one may be behind one that is fixed.
+pub fn held_ends<const D: usize>(chain: &Chain<D>, k: usize) -> Result<HeldEnds, [usize; 2]> {
+    let connectors = chain.connectors();
+    let is_held = |c: &Connector<D>| c.failed || c.mobility != Mobility::Free;
+    let below = (0..k).rev().find(|&i| is_held(&connectors[i]));
+    let above = (k + 1..connectors.len()).find(|&i| is_held(&connectors[i]));
+    let root = match (below, above) {
+        (None, None) => return Ok(HeldEnds::None),
+        (Some(root), None) | (None, Some(root)) => root,
+        (Some(low), Some(high)) => {
+            let are_still = connectors[low].is_still() && connectors[high].is_still();
+            return if are_still { Ok(HeldEnds::Two([low, high])) } else { Err([low, high]) };
+        }
+    };
+    if connectors[root].is_still() {
+        return Ok(HeldEnds::One(root));
+    }
+    // All of the chain moves with a base that does, and no other connector may hold it.
+    let other = (0..connectors.len()).find(|&i| i != root && i != k && is_held(&connectors[i]));
+    other.map_or(Ok(HeldEnds::One(root)), |other| Err([root.min(other), root.max(other)]))
+}
+
+fn held_twice_error(low: usize, high: usize) -> InputError {
+    let cause = format!("the chain is held at connectors {low} and {high}, and not both are fixed");
+    InputError::new("planner", cause, "fix both, hold one at most, or set planner = \"none\"")
 }
 
 impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
@@ -165,7 +278,7 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
     }
 
     fn distance_m(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
-        a.iter().zip(b).map(|(a, b)| distance(*a, *b)).fold(0.0, f64::max)
+        longest_move_m(a, b)
     }
 
     fn squared_distance(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> f64 {
@@ -178,23 +291,8 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
         b: &ChainPosture<D>,
         fraction: f64,
     ) -> ChainPosture<D> {
-        if fraction >= 1.0 {
-            return b.clone();
-        }
-        let mut posture = a.clone();
-        if !self.is_root_still() {
-            posture[self.root] = lerp(a[self.root], b[self.root], fraction);
-        }
-        for pair in self.limbs().flat_map(|limb| limb.windows(2)) {
-            let [inner, outer] = [pair[0], pair[1]];
-            let [from, to] = [a, b].map(|points| sub(points[outer], points[inner]));
-            let [from_m, to_m] = [norm(from), norm(to)];
-            let mean = lerp(scaled(from, 1.0 / from_m), scaled(to, 1.0 / to_m), fraction);
-            // Opposite directions have no mean; just beside it they turn one way or the other.
-            let u = normalized(mean).or(normalized(from)).unwrap_or(unit_x());
-            posture[outer] = add_scaled(posture[inner], u, from_m + fraction * (to_m - from_m));
-        }
-        posture
+        // Where there is nothing in between, the way to the end itself is found not to be free.
+        self.posture_between(a, b, fraction).unwrap_or_else(|| b.clone())
     }
 
     fn is_free(&self, posture: &ChainPosture<D>) -> bool {
@@ -202,11 +300,26 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
     }
 
     fn is_path_free(&self, a: &ChainPosture<D>, b: &ChainPosture<D>) -> bool {
+        if self.is_own_body_alone() {
+            let own_path = OwnPath {
+                chain: self.chain(),
+                from: a,
+                to: b,
+                posture_at: |fraction| self.posture_between(a, b, fraction),
+                is_solid: self.checker.self_collision,
+                step_m: self.step_m,
+                // Rods that are projected may change their posture at once.
+                even_m: if self.far_end.is_some() { self.refined_step_m() } else { f64::INFINITY },
+            };
+            return self.is_free(b) && own_path.is_clear();
+        }
         let n = (self.distance_m(a, b) / self.step_m).ceil().max(1.0) as usize;
         let mut before = a.clone();
         (1..=n).all(|step| {
             interrupt::check();
-            let next = self.interpolate(a, b, step as f64 / n as f64);
+            let Some(next) = self.posture_between(a, b, step as f64 / n as f64) else {
+                return false;
+            };
             // Rods that nearly turn around jump in between, and a jump may pass through an obstacle.
             let is_near = self.distance_m(&before, &next) <= MAX_STEPS * self.step_m;
             before = next;
@@ -229,10 +342,12 @@ impl<const D: usize> ConfigurationSpace for ChainConfigurationSpace<'_, D> {
             let side = scaled(direction(draws), stiffness * PI);
             u = normalized(add(u, side)).unwrap_or(u);
         }
-        posture
+        self.closed_posture(posture.clone()).unwrap_or(posture)
     }
 }
 
+/// Rounds of pushes that settle a posture, at most.
+const MAX_SETTLE_ROUNDS: usize = 8;
 /// Steps from one posture of a path that is followed to the next.
 const REFINED_STEPS: f64 = 8.0;
 /// Pairs of rods that the random postures of a search have, all together: as many as 2,000 postures of 8 rods. A

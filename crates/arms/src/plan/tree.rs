@@ -24,6 +24,14 @@ impl<S: ConfigurationSpace> PostureTree<S> {
         Self { parents: vec![None; roots.len()], postures: roots }
     }
 
+    /// Adds postures of a path that begins at the last one.
+    fn extend_from_last(&mut self, path: Vec<S::Posture>) {
+        for posture in path {
+            self.parents.push(self.postures.len().checked_sub(1));
+            self.postures.push(posture);
+        }
+    }
+
     /// Returns the posture nearest to another; of equal ones the first.
     fn nearest(&self, space: &S, to: &S::Posture) -> usize {
         let spreads = self.postures.iter().map(|posture| space.squared_distance(posture, to));
@@ -68,19 +76,20 @@ impl<S: ConfigurationSpace> PostureTree<S> {
     }
 }
 
-/// Returns postures from the present one to one of the goals, both included. The way straight to a goal is tried first, then
-/// the ways through `vias`.
+/// Returns postures from the present one to one of the goals, both included. The first tree begins with `trail`, a path
+/// from the present posture; the way straight to a goal is tried first.
 pub(super) fn find_path<S: ConfigurationSpace>(
     space: &S,
-    vias: Vec<S::Posture>,
+    trail: Vec<S::Posture>,
     goals: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Option<Vec<S::Posture>> {
-    let present = space.present_posture();
     let stride_m = MAX_STRIDE * space.length_m();
     let max_strides = (MAX_SEGMENT / MAX_STRIDE).ceil() as usize;
-    let mut trees = [PostureTree::new(vec![present.clone()]), PostureTree::new(goals.clone())];
-    let towards_goals = goals.into_iter().chain(vias).map(|to| (to, max_strides));
+    let mut trees =
+        [PostureTree::new(vec![space.present_posture()]), PostureTree::new(goals.clone())];
+    trees[0].extend_from_last(trail);
+    let towards_goals = goals.into_iter().map(|to| (to, max_strides));
     let drawn = std::iter::repeat_with(|| None).take(space.max_samples());
     for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
         interrupt::check();
@@ -105,13 +114,14 @@ pub(super) fn find_path<S: ConfigurationSpace>(
     None
 }
 
-/// Returns the path after its first posture, with shortcuts between random postures of it where they are
-/// free.
+/// Returns the path after its first posture, with shortcuts where they are free: from each posture as far ahead as
+/// halving the rest of the path shows, then between random postures.
 pub(super) fn shorten_path<S: ConfigurationSpace>(
     space: &S,
-    mut path: Vec<S::Posture>,
+    path: Vec<S::Posture>,
     draws: &mut Draws,
 ) -> Vec<S::Posture> {
+    let mut path = skip_ahead(space, path);
     for _ in 0..MAX_SHORTCUTS {
         if path.len() < 3 {
             break;
@@ -123,4 +133,20 @@ pub(super) fn shorten_path<S: ConfigurationSpace>(
         }
     }
     path.split_off(1)
+}
+
+/// Returns a path that leaves out what lies between a posture and the farthest one of the rest, of its half, its quarter,
+/// and so on, to which the straight path is free.
+fn skip_ahead<S: ConfigurationSpace>(space: &S, path: Vec<S::Posture>) -> Vec<S::Posture> {
+    let mut kept = vec![0];
+    let mut from = 0;
+    while from + 1 < path.len() {
+        let mut ahead = path.len() - 1 - from;
+        while ahead > 1 && !space.is_path_free(&path[from], &path[from + ahead]) {
+            ahead /= 2;
+        }
+        from += ahead;
+        kept.push(from);
+    }
+    kept.into_iter().map(|i| path[i].clone()).collect()
 }

@@ -13,8 +13,8 @@ use sidestep_arms::plan::{
     PlanningQuery, plan, plan_joints,
 };
 use sidestep_kernel::InputError;
-use sidestep_rods::geometry::{Point, distance};
-use sidestep_rods::{RodBvh, find_own_passage, find_tunneling};
+use sidestep_rods::geometry::{Point, between_segments, distance};
+use sidestep_rods::{Chain, RodBvh, find_own_passage, find_tunneling};
 use std::collections::VecDeque;
 
 /// Least fraction of a segment of the path that a cycle is worth.
@@ -30,20 +30,27 @@ const MAX_STEP_TRIES: usize = 5;
 const STEP_LIMIT_FRACTION: f64 = 0.99;
 
 /// Plans a path to the next target if local rules have come no nearer for long enough; if there was none, again
-/// after twice that time, because the search takes long where no path exists.
+/// after twice that time, because the search takes long where no path exists. In the first cycle of a target a path is
+/// planned if the straight way leads through the chain itself: local rules would push the chain into its own body.
 pub(super) fn plan_if_stuck<const D: usize>(
     initiator: Initiator<'_, D>,
     acting: &mut ChainCycleState<'_, D>,
     targets: &Targets<D>,
+    is_first_cycle: bool,
 ) {
     let Initiator { context, task, .. } = initiator;
     let body = &mut *acting.body;
-    if body.plan.is_some() || !is_plan_due(initiator, body.driving.late) {
-        return;
-    }
     let next = body.driving.next;
     let k = task.agent;
     let target = targets.places[next as usize];
+    let is_in_own_way = is_first_cycle
+        && task.plans_after_s.is_some()
+        && context.spec.arm.is_none()
+        && context.world.rules.self_collision
+        && crosses_own_body(&body.chain, k, target);
+    if body.plan.is_some() || !is_in_own_way && !is_plan_due(initiator, body.driving.late) {
+        return;
+    }
     // Half of the tolerance, so that the end of the path counts as the target though it is followed with rounding.
     let query = PlanningQuery { k, target, tolerance_m: 0.5 * targets.tolerance_m };
     // A chain without a base, or a target out of range, has no plan.
@@ -61,6 +68,18 @@ pub(super) fn plan_if_stuck<const D: usize>(
     };
     acting.sink.record(&body.chain, kind, k, value);
     body.plan = plan_found;
+}
+
+/// Returns whether a rod that does not begin at connector `k` is in its straight way to a target.
+fn crosses_own_body<const D: usize>(chain: &Chain<D>, k: usize, target: Point<D>) -> bool {
+    let way = [chain.points()[k], target];
+    let radius_m = chain.connectors()[k].radius_m;
+    let rods = chain.points().windows(2).zip(chain.rods()).enumerate();
+    // The rods at the connector itself come along.
+    let mut others = rods.filter(|(i, _)| *i != k && i + 1 != k);
+    others.any(|(_, (ends, rod))| {
+        between_segments(way, [ends[0], ends[1]]).distance_m < radius_m + rod.radius_m
+    })
 }
 
 /// Returns whether a path is planned after so many cycles without coming nearer: after one, two, four, eight times the
@@ -140,7 +159,7 @@ fn follow_chain_path<const D: usize>(
     let from = space.present_posture();
     let to = path.front()?;
     let limits = StepLimits::from_initiator(initiator);
-    let (next, is_there) = limits.next_posture(&space, &from, to);
+    let (next, is_there) = limits.next_posture(&space, &from, to)?;
     if !space.is_path_free(&from, &next) || !move_along(initiator, body, &from, &next) {
         return None;
     }
@@ -325,13 +344,14 @@ impl StepLimits {
         Self { joint: escape_m.map_or(limits.joint, |most_m| limits.joint.min(most_m)), ..limits }
     }
 
-    /// Returns the posture between two that is reached in one cycle, and whether it is the second one.
+    /// Returns the posture between two that is reached in one cycle, and whether it is the second one; none if every motion
+    /// that way is too fast.
     fn next_posture<const D: usize>(
         &self,
         space: &ChainConfigurationSpace<'_, D>,
         from: &ChainPosture<D>,
         to: &ChainPosture<D>,
-    ) -> (ChainPosture<D>, bool) {
+    ) -> Option<(ChainPosture<D>, bool)> {
         let mut fraction = 1.0;
         let mut next = to.clone();
         while fraction >= MIN_FRACTION {
@@ -339,12 +359,12 @@ impl StepLimits {
             let led = distance(from[self.agent], next[self.agent]) / self.led;
             let excess = led.max(moves_m.fold(0.0, f64::max) / self.joint);
             if excess <= 1.0 {
-                break;
+                return Some((next, fraction >= 1.0));
             }
             // Connectors of a chain turn about others, and do not move in proportion: it may take several rounds.
             fraction *= STEP_LIMIT_FRACTION / excess;
             next = space.interpolate(from, to, fraction);
         }
-        (next, fraction >= 1.0)
+        None
     }
 }

@@ -130,6 +130,7 @@ fn step_to_target<const D: usize>(
         initiator.context.spec.arm.is_some() && initiator.task.plans_after_s.is_some();
     let min_gain_fraction = if is_planning_arm { MIN_ARM_GAIN_FRACTION } else { MIN_GAIN_FRACTION };
     let min_gain_m = (min_gain_fraction * initiator.step_m()).min(left_m);
+    let is_first_cycle = driving.nearest_m == f64::INFINITY;
     let comes_nearer = driving.nearest_m - left_m > min_gain_m;
     // On a planned path a chain goes away from its target at first, and that is no time lost.
     if !is_planned {
@@ -137,7 +138,7 @@ fn step_to_target<const D: usize>(
     }
     driving.nearest_m = driving.nearest_m.min(left_m);
     if left_m > targets.tolerance_m {
-        plan_if_stuck(initiator, acting, targets);
+        plan_if_stuck(initiator, acting, targets, is_first_cycle);
         return match acting.body.plan {
             Some(_) => DesiredMove::Follow,
             None => DesiredMove::Go(move_toward(at, target, initiator.step_m())),

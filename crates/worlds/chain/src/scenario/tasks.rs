@@ -11,8 +11,9 @@ use super::{BoxSection, ChainScenarioCompiler, MAX_VALUE, PointValue, PositiveNu
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
+use sidestep_arms::plan::{HeldEnds, held_ends};
 use sidestep_kernel::InputError;
-use sidestep_rods::{Chain, Connector, Mobility};
+use sidestep_rods::{Chain, Mobility};
 use sidestep_scenario::{ByName, Spanned};
 use std::ops::Range;
 use std::sync::Arc;
@@ -150,15 +151,15 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let s = section.get_ref();
         let at = section.span();
         let n = chain.points().len();
-        let plans = s.has_planner(self.plans_usually(is_swarm, chain));
-        if plans {
-            self.check_planner(section, chain)?;
-        }
         if s.connector >= n {
             let cause = format!("connector = {} of a chain of {n}", s.connector);
             let remedy = format!("count from 0: the last connector is {}", n - 1);
             let at = self.source.key_span(at, &["connector"]);
             return Err(self.source.error(at, cause, remedy));
+        }
+        let plans = s.has_planner(self.plans_usually(is_swarm, chain, s.connector));
+        if plans {
+            self.check_planner(section, chain)?;
         }
         let driver = match &s.kind {
             ByName::BuiltIn(word) => {
@@ -184,12 +185,15 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         })
     }
 
-    /// Returns whether tasks of a chain plan paths unless they say otherwise: with a fixed base always, and otherwise
-    /// where its own body can be in its way and plans are cheap and stay right, because the chain is short, held at
-    /// one connector at most, moved as a whole, and nothing moves around it.
-    fn plans_usually(&self, is_swarm: bool, chain: &Chain<D>) -> bool {
-        let held = chain.connectors().iter().filter(|c| c.mobility != Mobility::Free).count();
-        let has_base = chain.connectors().iter().any(|c| c.mobility == Mobility::Fixed);
+    /// Returns whether tasks of a chain whose connector `k` is led plan paths unless they say otherwise: with one fixed base
+    /// always, and otherwise where its own body can be in its way and plans are cheap and stay right, because the chain is
+    /// short, moved as a whole, and nothing moves around it.
+    fn plans_usually(&self, is_swarm: bool, chain: &Chain<D>, k: usize) -> bool {
+        let ends = held_ends(chain, k);
+        let has_base = match ends {
+            Ok(HeldEnds::One(base)) => chain.connectors()[base].mobility == Mobility::Fixed,
+            _ => false,
+        };
         let is_alone = self.file.chain.deployment == Deployment::Direct
             && self.file.chain.self_collision != Some(false)
             && !is_swarm
@@ -197,7 +201,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             && self.file.chains.0.iter().map(|section| section.get_ref().count).sum::<usize>() == 1;
         // A single connector has no posture to plan.
         !chain.rods().is_empty()
-            && held <= 1
+            && ends.is_ok()
             && (has_base || is_alone && chain.rods().len() <= MAX_PLANNED_RODS)
     }
 
@@ -213,13 +217,11 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             let remedy = "leave it out: there are no rods whose posture it could plan";
             return Err(self.source.error(planner_span(), cause, remedy));
         }
-        let mut held = chain.connectors().iter().enumerate();
-        let is_held = |(_, c): &(usize, &Connector<D>)| c.mobility != Mobility::Free;
-        let (Some((low, _)), Some((high, _))) = (held.find(is_held), held.find(is_held)) else {
-            return Ok(());
-        };
-        let cause = format!("a planner for a chain that is held at connectors {low} and {high}");
-        let remedy = "leave it out, or hold the chain at one connector at most";
+        let Err([low, high]) = held_ends(chain, section.get_ref().connector) else { return Ok(()) };
+        let cause = format!(
+            "a planner for a chain that is held at connectors {low} and {high}, and not both are fixed"
+        );
+        let remedy = "leave it out, fix both connectors, or hold the chain at one at most";
         Err(self.source.error(planner_span(), cause, remedy))
     }
 

@@ -134,3 +134,60 @@ fn no_part_of_a_held_chain_is_faster_than_its_joints_may_be_whichever_leads() {
         assert_eq!(run.world().chain_metrics(run.state(), 0).progress, 1.0, "{mobility}");
     }
 }
+
+/// Asserts that a run keeps all connectors within a speed, and returns its events.
+fn events_within_speed(run: &mut ChainRun<2>, cycles: u64, most_m_s: f64) -> Vec<(String, f64)> {
+    let mut events = Vec::new();
+    let mut before = run.state().body(0).chain.points().to_vec();
+    for cycle in 0..cycles {
+        if run.is_over() {
+            break;
+        }
+        events.extend(told(run, cycle + 1));
+        let after = run.state().body(0).chain.points().to_vec();
+        for (k, (from, to)) in before.iter().zip(&after).enumerate() {
+            let speed_m_s = distance(*from, *to) / 0.02;
+            assert!(speed_m_s <= most_m_s + 1e-6, "cycle {cycle}, connector {k}: {speed_m_s} m/s");
+        }
+        before = after;
+    }
+    events
+}
+
+/// A free chain that winds about itself among targets on all sides.
+#[test]
+fn no_part_of_a_free_chain_is_faster_than_it_may_be() {
+    let mut draws = crate::fixtures::TestRng::new(3);
+    let targets: Vec<_> = (0..10).map(|_| draws.point::<2>(1.5)).collect();
+    let mut run = run(&format!(
+        "cycles = 9000\n[chain]\njoint_speed_m_s = 0.7\n[[chains]]\nconnectors = 16\nrod_m = 0.3\n\
+         radius_m = 0.04\nrod_radius_m = 0.02\n\
+         tasks = [{{ kind = \"targets\", targets_m = {targets:?}, tolerance_m = 0.01, speed_m_s = 0.5 }}]\n"
+    ));
+    events_within_speed(&mut run, 9000, 0.7);
+    assert!(run.is_over());
+    assert_eq!(run.world().chain_metrics(run.state(), 0).progress, 1.0);
+}
+
+#[test]
+fn a_path_is_planned_at_once_where_the_straight_way_leads_through_the_chain() {
+    // A hook whose tip is on one side of its shaft.
+    let hook = |target: &str, planner: &str| {
+        run(&format!(
+            "cycles = 2000\n[[chains]]\npoints_m = [[0.6, 0.5], [0.9, 0.5], [0.9, 0.2], [0.6, 0.2], [0.3, 0.2], [0, 0.2]]\n\
+             rod_m = [0.29, 0.31]\nradius_m = 0.02\nrod_radius_m = 0.01\n\
+             limits = [{{ connector = 5, mobility = \"fixed\" }}]\n\
+             tasks = [{{ kind = \"targets\", targets_m = [{target}], tolerance_m = 0.01, {planner} }}]\n"
+        ))
+    };
+    let first_plan = |target: &str| {
+        let mut run = hook(target, "planner = \"rrt-connect\"");
+        count(&told(&mut run, 1), "planned")
+    };
+    assert_eq!(first_plan("[0.6, -0.3]"), 1, "its shaft is in between");
+    assert_eq!(first_plan("[0.6, 0.7]"), 0, "nothing is");
+    assert_eq!(count(&told(&mut hook("[0.6, -0.3]", "planner = \"none\""), 1), "planned"), 0);
+    let mut run = hook("[0.6, -0.3]", "planner = \"rrt-connect\"");
+    events_within_speed(&mut run, 2000, 1.0);
+    assert_eq!(run.world().chain_metrics(run.state(), 0).progress, 1.0);
+}

@@ -1,5 +1,7 @@
 //! Ways among obstacles, each checked posture by posture by another measure than the planner's.
 
+mod own_body;
+
 use super::*;
 use sidestep_kernel::Seed;
 use sidestep_kernel::interrupt::Interrupt;
@@ -100,14 +102,17 @@ fn no_way_leads_into_an_obstacle_or_out_of_reach() {
 }
 
 #[test]
-fn a_chain_that_is_held_twice_has_no_plan() {
+fn a_chain_that_is_held_on_both_sides_has_a_plan_only_if_both_are_fixed() {
     let mut chain = arm();
-    chain.set_mobility(5, Mobility::Fixed).unwrap();
+    chain.set_mobility(5, Mobility::OnSegment([[2.0, 0.0], [3.0, 0.0]])).unwrap();
     let between = PlanningQuery { k: 3, ..BEHIND };
-    let error =
-        plan(&chain, &wall(), ReactionRules::default(), &between, &mut draws(1)).unwrap_err();
+    let plan =
+        |chain: &Chain<2>| plan(chain, &wall(), ReactionRules::default(), &between, &mut draws(1));
+    let error = plan(&chain).unwrap_err();
     assert_eq!(error.place(), "planner");
     assert!(error.to_string().contains("connectors 0 and 5"), "{error}");
+    chain.set_mobility(5, Mobility::Fixed).unwrap();
+    assert_eq!(plan(&chain), Ok(None), "the chain is straight, and cannot move at all");
 }
 
 /// A spiral of twelve rods, in which the tool lies innermost: it gets out by uncurling alone.
