@@ -17,12 +17,12 @@ const SLOW_FRACTION: f64 = 0.99;
 /// Returns remarks on files, then on joints, on the network, and on rules without effect.
 pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark> {
     let ground = compiled.recipe.iter().flat_map(|recipe| recipe.ground_remarks.iter().cloned());
-    let mut chains = compiled.world.chains.iter().enumerate();
+    let chains = compiled.world.chains.iter().enumerate();
     let files = chains.clone().flat_map(|(k, spec)| arm_file_remarks(k, spec));
     let unlimited = chains.clone().filter_map(|(k, spec)| unlimited_speeds_remark(k, spec));
     let led_slowly = chains.clone().filter_map(|(k, spec)| slow_joints_remark(k, spec));
     // One of them is enough: all chains talk over the same network.
-    let slow = chains.find_map(|(k, spec)| slow_network_remark(&compiled.world, k, spec));
+    let slow = chains.clone().find_map(|(k, spec)| slow_network_remark(&compiled.world, k, spec));
     let of_files = ground.chain(files);
     let own_overlap = own_overlap_remark(&compiled.world);
     let overlaps = chains.clone().filter_map(|(k, spec)| exempt_overlaps_remark(k, spec));
