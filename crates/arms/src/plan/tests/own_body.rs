@@ -67,7 +67,7 @@ fn assert_is_sound(chain: &Chain<2>, k: usize, path: &[ChainPosture<2>]) {
 #[test]
 fn a_way_through_the_chain_itself_is_seen_though_both_ends_are_free() {
     // The last of six rods is outside the jaw of the others.
-    let jaw = |last_rad: f64| chain_along(&[0.0, 0.0, 1.5, 3.14, 3.9, last_rad]);
+    let jaw = |last_rad: f64| chain_along(&[0.0, 0.0, 1.5, 3.15, 3.9, last_rad]);
     let from = jaw(-2.9);
     let obstacles = Obstacles::default();
     let space = ChainConfigurationSpace::new(&from, &obstacles, true, 6).unwrap();
