@@ -72,7 +72,7 @@ fn a_chain_shows_who_leads_and_where_to_go() {
     let svg = place.read("r/trajectories.svg");
     // In the picture and in the legend.
     assert_eq!(of_class(&svg, "leader").len(), 2, "{svg}");
-    assert_eq!(of_class(&svg, "target").len(), 2, "{svg}");
+    assert_eq!(of_class(&svg, "target").len(), 3, "two in the picture, one in the legend: {svg}");
     assert!(svg.contains(">leader<") && svg.contains(">2</text>"), "{svg}");
 }
 

@@ -77,14 +77,17 @@ fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<It
     let moves = !world.movers.is_empty();
     let holds = world.chains.iter().any(is_ever_held);
     let given = compiled.recipe.iter().flat_map(|recipe| recipe.given_rules());
-    // Chains that nothing holds keep to the speed of escapes where obstacles move.
-    let idle =
-        given.filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds && moves });
+    // Chains that nothing holds keep to the speed of escapes where obstacles move, and to none where their own body is not
+    // solid.
+    let is_free_limited = world.rules.free_step_max_m < f64::INFINITY;
+    let idle = given
+        .filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds && !is_free_limited });
     idle.map(|(key, of_movers)| {
         let why = if of_movers {
             "no obstacle moves: give one velocity_m_s or patrol_m"
         } else {
-            "no connector is held and obstacles move: give a connector a mobility, or escape_speed_m_s for this"
+            "no connector is held, and obstacles move or self_collision is off: give a connector a mobility, or \
+             escape_speed_m_s for this"
         };
         Remark::note(
             format!("chain.{key}"),

@@ -430,10 +430,13 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         let joint_speed_m_s = self.joint_speed_m_s(&chains);
         let slave_step_max_m = self.slave_step_max_m(&chains, &ground, escape.as_ref(), dt_s);
         let joint_step_max_m = joint_speed_m_s * dt_s;
-        // Among obstacles that move the limit of escapes holds for all motions of a cycle.
-        let free_step_max_m = if escape.is_some() { f64::INFINITY } else { joint_step_max_m };
-        let rules =
-            ReactionRules { slave_step_max_m, free_step_max_m, ..self.rules(joint_step_max_m) };
+        let usual = self.rules(joint_step_max_m);
+        // Among obstacles that move the limit of escapes holds for all motions of a cycle. Where the own body is not solid,
+        // agents of connectors may move a chain, which know the steps of their neighbors alone; one process must not move
+        // it otherwise.
+        let is_limited = usual.self_collision && escape.is_none();
+        let free_step_max_m = if is_limited { joint_step_max_m } else { f64::INFINITY };
+        let rules = ReactionRules { slave_step_max_m, free_step_max_m, ..usual };
         let network = self.network(dt_s, &chains)?;
         self.check_local_knowledge(&chains, &rules, escape.is_some())?;
         let world = ChainWorld {

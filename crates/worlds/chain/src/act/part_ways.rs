@@ -25,9 +25,14 @@ pub(super) fn plan_part_ways<const D: usize>(
     let goals: Vec<Point<D>> = unflatten(&scattered.goals_m);
     let chain = &body.chain;
     let mut ways = Vec::with_capacity(scattered.way_count());
-    for k in scattered.first as usize - 1..=scattered.last as usize + 1 {
-        let radius_m = chain.connectors()[k].radius_m;
-        let space = PartSpace { obstacles, radius_m, from: chain.points()[k], goal: goals[k] };
+    let with_ways = scattered.first as usize - 1..=scattered.last as usize + 1;
+    for k in with_ways {
+        let space = PartSpace {
+            obstacles,
+            radius_m: chain.connectors()[k].radius_m,
+            from: chain.points()[k],
+            goal: goals[k],
+        };
         let mut way = space.way_points(draws).unwrap_or_default();
         // The goal itself is where the parts go anyway.
         way.pop();
