@@ -79,7 +79,7 @@ fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<It
     let given = compiled.recipe.iter().flat_map(|recipe| recipe.given_rules());
     // Chains that nothing holds keep to the speed of escapes where obstacles move, and to none where their own body is not
     // solid.
-    let is_free_limited = world.rules.free_step_max_m < f64::INFINITY;
+    let is_free_limited = world.rules.self_collision && !moves;
     let idle = given
         .filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds && !is_free_limited });
     idle.map(|(key, of_movers)| {
