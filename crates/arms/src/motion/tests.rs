@@ -5,6 +5,7 @@ use crate::kinematics::SerialChain;
 use proptest::prelude::*;
 use sidestep_import::urdf::Model;
 use sidestep_import::urdf::joint_limits::{GivenRates, JointRates as RatesByName};
+use sidestep_kernel::math;
 
 fn rates(speed: f64, acceleration: f64, jerk: f64) -> JointRates {
     JointRates { speed, acceleration, jerk }
@@ -173,7 +174,7 @@ fn the_coming_postures_are_the_weighted_means_of_their_references() {
         let mut joints = vec![0.0, 0.5];
         for k in 0..40 {
             let wave = f64::from(k) * 0.37;
-            let reference = [0.003 * f64::from(k), 0.5 + 0.002 * wave.sin()];
+            let reference = [0.003 * f64::from(k), 0.5 + 0.002 * math::sin(wave)];
             let coming = filter.stop_postures(&state, &joints, &reference);
             // Advanced by resting at the reference.
             let mut later = state.clone();

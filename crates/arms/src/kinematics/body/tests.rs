@@ -3,6 +3,7 @@ use crate::kinematics::{ArmBodyPart as HitPart, ArmGoal, CollidesWith, IkFailure
 use proptest::prelude::*;
 use sidestep_import::urdf::Solid;
 use sidestep_import::urdf::srdf::Semantics;
+use sidestep_kernel::math;
 use sidestep_rods::{Obstacle, Obstacles};
 use sidestep_testing::robot_model as shared;
 use std::path::Path;
@@ -322,7 +323,7 @@ fn enclosures_hold_their_parts() {
             let turn = 2.4 * f64::from(k);
             let rise = f64::from(k) / 100.0 - 0.995;
             let flat = (1.0 - rise * rise).sqrt();
-            let direction = vector([flat * turn.cos(), flat * turn.sin(), rise]);
+            let direction = vector([flat * math::cos(turn), flat * math::sin(turn), rise]);
             let farthest = point(support.support_point(&shape.pose, direction));
             let outside_m =
                 enclosure.core.nearest_to_point(farthest).distance_m - enclosure.radius_m;
