@@ -220,7 +220,21 @@ def run(command):
 
 def recorded(folder, sidestep, count):
     """Returns the joint values of a recorded run, a row for each cycle."""
-    run([sidestep, "export", folder, "--to", "csv", "--table", "joints", "--out", folder.with_suffix(".csv"), "-q", "--replace"])
+    run(
+        [
+            sidestep,
+            "export",
+            folder,
+            "--to",
+            "csv",
+            "--table",
+            "joints",
+            "--out",
+            folder.with_suffix(".csv"),
+            "-q",
+            "--replace",
+        ]
+    )
     files = [folder.with_suffix(".csv"), *folder.with_suffix(".csv").glob("*.csv")]
     with next(file for file in files if file.is_file()).open(encoding="utf-8") as file:
         values = [float(row["value"]) for row in csv.DictReader(file)]

@@ -146,9 +146,7 @@ def two_ended_world(links, dimensions, seed, targets=24):
         point = ball(draws, dimensions, 0.5 * links * ROD_M)
         if all(np.linalg.norm(point - points[end]) <= reach_m for end, reach_m in zip((0, -1), reaches_m)):
             drawn.append(point)
-    return World(
-        "two ends", dimensions, points, rod_m, RADIUS_M, ROD_RADIUS_M, leader, np.round(drawn, 4)
-    )
+    return World("two ends", dimensions, points, rod_m, RADIUS_M, ROD_RADIUS_M, leader, np.round(drawn, 4))
 
 
 def snakes(seed):
