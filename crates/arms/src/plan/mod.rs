@@ -1,5 +1,6 @@
-//! Motion planning for chains that are free, held at one connector, or led between two fixed ones: a path among obstacles, and out of the chain's
-//! own way, from the present posture to one that reaches a target, where no local rule finds one.
+//! Motion planning for chains that are free, held at one connector, or led between two fixed ones: a path among
+//! obstacles, and out of the chain's own way, from the present posture to one that reaches a target, where no local rule
+//! finds one.
 //!
 //! ```text
 //! space.rs:    postures of rods, the straight path between two, and whether it is free
@@ -90,7 +91,7 @@ pub trait ConfigurationSpace {
     fn squared_distance(&self, a: &Self::Posture, b: &Self::Posture) -> f64;
 
     /// Returns the posture at a fraction of the straight path from one to another: all parts turn and change
-    /// their lengths evenly.
+    /// their lengths evenly. From 1 on it is the other posture.
     fn interpolate(&self, a: &Self::Posture, b: &Self::Posture, fraction: f64) -> Self::Posture;
 
     /// Returns whether a posture keeps all constraints and touches nothing.
@@ -131,7 +132,7 @@ pub fn plan<const D: usize>(
             path.or_else(|| find_path(&space, trail, goals, draws))
         }
     };
-    Ok(path.map(|path| refined_path(&space, path)))
+    Ok(path.and_then(|path| refined_path(&space, path)))
 }
 
 /// Returns a path without what shortcuts leave out.
@@ -151,24 +152,28 @@ fn shorten_from_present<const D: usize>(
 fn refined_path<const D: usize>(
     space: &ChainConfigurationSpace<'_, D>,
     path: Vec<ChainPosture<D>>,
-) -> Vec<ChainPosture<D>> {
+) -> Option<Vec<ChainPosture<D>>> {
     let mut refined = Vec::new();
     let mut from = space.present_posture();
     for to in path {
-        refined.extend(refined_piece(space, &from, &to));
+        refined.extend(refined_piece(space, &from, &to)?);
         from = to;
     }
-    refined
+    Some(refined)
 }
 
-/// Returns postures on the straight path after one posture up to another, each near the one before.
+/// Returns postures on the straight path after one posture up to another, each near the one before; none if they would be
+/// too many to keep, because the path is so long.
 fn refined_piece<const D: usize>(
     space: &ChainConfigurationSpace<'_, D>,
     from: &ChainPosture<D>,
     to: &ChainPosture<D>,
-) -> Vec<ChainPosture<D>> {
+) -> Option<Vec<ChainPosture<D>>> {
     let step_m = space.refined_step_m();
     let mut n = (space.distance_m(from, to) / step_m).ceil().max(1.0) as usize;
+    if n > MAX_PIECES {
+        return None;
+    }
     loop {
         // Where the projection onto two ends finds no posture, the path goes on straight to the next one.
         let posture_at = |step| space.posture_between(from, to, step as f64 / n as f64);
@@ -178,7 +183,7 @@ fn refined_piece<const D: usize>(
             starts.zip(&pieces).map(|(a, b)| space.distance_m(a, b)).fold(0.0, f64::max);
         // A chain that swings out and back goes farther than its ends tell.
         if longest_m <= MAX_REFINED_STEPS * step_m || n > MAX_PIECES {
-            return pieces;
+            return Some(pieces);
         }
         n *= 2;
     }

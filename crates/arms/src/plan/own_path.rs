@@ -112,8 +112,10 @@ fn bow_heights<const D: usize>(chain: &Chain<D>, piece: Piece<'_, D>) -> Vec<f64
     let mut sum_m = 0.0;
     let mut bows_m = vec![0.0];
     for (rod, limits) in chain.rods().iter().enumerate() {
-        let turn = sub(sub(to[rod + 1], to[rod]), sub(from[rod + 1], from[rod]));
-        sum_m += BOW_HEIGHT * norm_squared(turn) / limits.min_m.max(f64::MIN_POSITIVE);
+        let [start, end] = [from, to].map(|points| sub(points[rod + 1], points[rod]));
+        // On the way it is never shorter than at both ends, and a bound by its limits could be none: they may be tiny.
+        let shortest_m = norm(start).min(norm(end)).max(limits.min_m);
+        sum_m += BOW_HEIGHT * norm_squared(sub(end, start)) / shortest_m.max(f64::MIN_POSITIVE);
         bows_m.push(sum_m);
     }
     bows_m

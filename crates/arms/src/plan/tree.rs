@@ -93,7 +93,7 @@ pub(super) fn find_path<S: ConfigurationSpace>(
     let drawn = std::iter::repeat_with(|| None).take(space.max_samples());
     for (i, toward) in towards_goals.map(Some).chain(drawn).enumerate() {
         interrupt::check();
-        // The trees take turns; the first tries are straight to the goals and the postures on the way.
+        // The trees take turns; the first tries are straight to the goals.
         let (one, other) = if toward.is_some() { (0, 1) } else { (i % 2, 1 - i % 2) };
         let (to, strides) = toward.unwrap_or_else(|| (space.sample(draws), 1));
         let Some((tip, _)) = trees[one].grow_toward(space, &to, stride_m, strides) else {

@@ -16,6 +16,8 @@ use sidestep_rods::geometry::{
 
 /// Steps at most.
 const MAX_STEPS: usize = 3_000;
+/// Pairs of rods in all steps of an unfolding at most: as many as those of the most steps of 64 rods.
+const MAX_EFFORT: usize = MAX_STEPS * 64 * 64;
 /// Longest and shortest step of a connector, as fractions of the longest rod: a step that is not free, or leads uphill, is
 /// halved, and one that is free is longer next time.
 const LONGEST_STEP: f64 = 0.5;
@@ -47,7 +49,9 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         let mut postures = Vec::new();
         let mut at = from.clone();
         let mut step_m = LONGEST_STEP * rod_m;
-        for _ in 0..MAX_STEPS {
+        let rods = self.chain().rods().len().max(1);
+        let steps = MAX_STEPS.min(MAX_EFFORT / (rods * rods));
+        for _ in 0..steps {
             interrupt::check();
             let (energy, forces) = self.repulsion(&at);
             let mut moved = None;

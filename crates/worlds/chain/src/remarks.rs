@@ -77,17 +77,19 @@ fn unused_rules<const D: usize>(compiled: &ChainScenario<D>) -> impl Iterator<It
     let moves = !world.movers.is_empty();
     let holds = world.chains.iter().any(is_ever_held);
     let given = compiled.recipe.iter().flat_map(|recipe| recipe.given_rules());
-    // Chains that nothing holds keep to the speed of escapes where obstacles move, and to none where their own body is not
+    let escapes = world.escape.is_some();
+    // Chains that nothing holds keep to the speed of escapes where parts escape, and to none where their own body is not
     // solid.
-    let is_free_limited = world.rules.self_collision && !moves;
+    let is_free_limited = world.rules.self_collision && !escapes;
     let idle = given
         .filter(move |(_, of_movers)| if *of_movers { !moves } else { !holds && !is_free_limited });
-    idle.map(|(key, of_movers)| {
+    idle.map(move |(key, of_movers)| {
         let why = if of_movers {
             "no obstacle moves: give one velocity_m_s or patrol_m"
+        } else if escapes {
+            "no connector is held and parts escape: give a connector a mobility, or escape_speed_m_s for this"
         } else {
-            "no connector is held, and obstacles move or self_collision is off: give a connector a mobility, or \
-             escape_speed_m_s for this"
+            "no connector is held and self_collision is off: give a connector a mobility, or set self_collision = true"
         };
         Remark::note(
             format!("chain.{key}"),
@@ -225,6 +227,25 @@ mod tests {
         let links: String = (0..=hinges).map(link).collect();
         let joints: String = (0..hinges).map(joint).collect();
         format!("<robot name=\"planar\">{links}{joints}</robot>")
+    }
+
+    #[test]
+    fn a_limit_of_joints_that_has_no_effect_on_a_free_chain_is_told_with_what_has() {
+        let told = |chain: &str| {
+            let text = format!(
+                "format = 1\nworld = \"chain\"\n[chain]\njoint_speed_m_s = 0.2\n{chain}\n[[obstacles]]\nat_m = [9.0, 9.0]\n\
+                 radius_m = 0.5\nvelocity_m_s = [0.1, 0.0]\n[[chains]]\nconnectors = 5\nrod_m = 0.5\n\
+                 [[chains.tasks]]\nkind = \"script\"\nscript = \"forward 1\"\n"
+            );
+            let scenario =
+                ChainScenario::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
+            let all = remarks(&scenario).into_iter().map(|remark| remark.to_string());
+            all.filter(|remark| remark.contains("joint_speed_m_s")).collect::<String>()
+        };
+        assert!(told("").contains("escape_speed_m_s"), "{}", told(""));
+        assert_eq!(told("escape = \"off\""), "", "it holds there");
+        let loose = told("escape = \"off\"\nself_collision = false");
+        assert!(loose.contains("self_collision = true"), "{loose}");
     }
 
     #[test]

@@ -124,7 +124,7 @@ fn repulsion_alone_opens_a_spiral() {
     let last = trail.last().expect("a way out");
     let stretched_m = distance(last[0], last[14]);
     assert!(stretched_m > 0.9 * 0.3 * 14.0, "{stretched_m} m after {} steps", trail.len());
-    assert_is_sound(&chain, 14, &refined_path(&space, trail));
+    assert_is_sound(&chain, 14, &refined_path(&space, trail).expect("a short path"));
 }
 
 /// Returns a chain between two fixed ends, in an arc above them.

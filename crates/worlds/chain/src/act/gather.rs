@@ -141,6 +141,7 @@ impl<const D: usize> ScatteredParts<'_, D> {
         let at = self.chain.points()[k];
         let mut attempt = GatherAttempt::default();
         if at == next {
+            self.leave_way_point(k, next);
             return attempt;
         }
         let radius_m = self.chain.connectors()[k].radius_m;
@@ -163,6 +164,7 @@ impl<const D: usize> ScatteredParts<'_, D> {
         let at = self.chain.points()[stub];
         let mut attempt = GatherAttempt::default();
         if at == next {
+            self.leave_way_point(stub, next);
             return attempt;
         }
         for shorter in STEP_FRACTIONS {

@@ -91,7 +91,8 @@ impl<const D: usize> ConfigurationSpace for PartSpace<'_, D> {
     }
 
     fn interpolate(&self, a: &Point<D>, b: &Point<D>, fraction: f64) -> Point<D> {
-        lerp(*a, *b, fraction)
+        // Strides that reach beyond the other posture end at it.
+        lerp(*a, *b, fraction.min(1.0))
     }
 
     fn is_free(&self, at: &Point<D>) -> bool {
@@ -109,5 +110,20 @@ impl<const D: usize> ConfigurationSpace for PartSpace<'_, D> {
         let spread_m = 0.5 * scale * self.length_m();
         let middle = lerp(self.from, self.goal, draws.uniform());
         middle.map(|x| x + spread_m * (2.0 * draws.uniform() - 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_rods::Obstacle;
+
+    #[test]
+    fn a_stride_that_reaches_beyond_a_posture_ends_at_it() {
+        let ball = Obstacles::new(vec![Obstacle::ball(0, [1.0, 0.0], 0.5)], 1.0).expect("a ball");
+        let space =
+            PartSpace { obstacles: &ball, radius_m: 0.05, from: [0.0; 2], goal: [2.0, 0.0] };
+        assert_eq!(space.interpolate(&[0.0; 2], &[0.3, 0.1], 1.7), [0.3, 0.1]);
+        assert_eq!(space.interpolate(&[0.0; 2], &[0.3, 0.1], 0.5), [0.15, 0.05]);
     }
 }

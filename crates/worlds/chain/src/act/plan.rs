@@ -14,9 +14,11 @@ use sidestep_arms::plan::{
 };
 use sidestep_kernel::InputError;
 use sidestep_rods::geometry::{Point, between_segments, distance};
-use sidestep_rods::{Chain, RodBvh, find_own_passage, find_tunneling};
+use sidestep_rods::{Chain, ChainPart, RodBvh, TOLERANCE_M, find_own_passage, find_tunneling};
 use std::collections::VecDeque;
 
+/// Rods up to which a path is planned before a chain is stuck: a search takes a time that grows with the cube of their number.
+const MAX_FIRST_PLAN_RODS: usize = 64;
 /// Least fraction of a segment of the path that a cycle is worth.
 const MIN_FRACTION: f64 = 1e-6;
 /// Bisections of a straight piece of an arm's path: to a millionth of it, less than rounding of what a cycle allows.
@@ -47,13 +49,14 @@ pub(super) fn plan_if_stuck<const D: usize>(
         && task.plans_after_s.is_some()
         && context.spec.arm.is_none()
         && context.world.rules.self_collision
+        && body.chain.rods().len() <= MAX_FIRST_PLAN_RODS
         && crosses_own_body(&body.chain, k, target);
     if body.plan.is_some() || !is_in_own_way && !is_plan_due(initiator, body.driving.late) {
         return;
     }
     // Half of the tolerance, so that the end of the path counts as the target though it is followed with rounding.
     let query = PlanningQuery { k, target, tolerance_m: 0.5 * targets.tolerance_m };
-    // A chain without a base, or a target out of range, has no plan.
+    // A chain that is held on both sides otherwise than by fixed ends, or a target out of range, has no plan.
     let plan_found = find_path(context, body, &query).ok().flatten();
     let rungs = &mut body.tally.rungs;
     let (kind, value) = match &plan_found {
@@ -70,15 +73,14 @@ pub(super) fn plan_if_stuck<const D: usize>(
     body.plan = plan_found;
 }
 
-/// Returns whether a rod that does not begin at connector `k` is in its straight way to a target.
+/// Returns whether a rod of the chain is in the straight way of connector `k` to a target: nearer than the two may be. Those
+/// that meet at it, or near it in a chain of short rods, are no obstacles to it.
 fn crosses_own_body<const D: usize>(chain: &Chain<D>, k: usize, target: Point<D>) -> bool {
     let way = [chain.points()[k], target];
-    let radius_m = chain.connectors()[k].radius_m;
-    let rods = chain.points().windows(2).zip(chain.rods()).enumerate();
-    // The rods at the connector itself come along.
-    let mut others = rods.filter(|(i, _)| *i != k && i + 1 != k);
-    others.any(|(_, (ends, rod))| {
-        between_segments(way, [ends[0], ends[1]]).distance_m < radius_m + rod.radius_m
+    chain.points().windows(2).enumerate().any(|(rod, ends)| {
+        let keep_m = chain.min_separation_m(ChainPart::Connector(k), ChainPart::Rod(rod));
+        let apart_m = between_segments(way, [ends[0], ends[1]]).distance_m;
+        keep_m.is_some_and(|keep_m| apart_m < keep_m - TOLERANCE_M)
     })
 }
 

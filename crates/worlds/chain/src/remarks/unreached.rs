@@ -11,6 +11,9 @@ const RESTARTS: usize = 25;
 /// Rods up to which postures are sought: the time of a search grows with the square of their number.
 const MAX_RODS: usize = 64;
 
+/// Pairs of rods in all searches of a scenario at most: about a second.
+const MAX_EFFORT: usize = 25_000;
+
 /// Returns a warning on the targets of each task of a chain on a fixed base for which no posture is found.
 pub(super) fn unreached_targets_remarks<const D: usize>(
     world: &ChainWorld<D>,
@@ -21,6 +24,8 @@ pub(super) fn unreached_targets_remarks<const D: usize>(
     if spec.arm.is_some() || !spec.changes.is_empty() || spec.start.rods().len() > MAX_RODS {
         return Vec::new();
     }
+    let rods = spec.start.rods().len().max(1);
+    let mut searches = MAX_EFFORT / (rods * rods * world.chains.len());
     let tasks = spec.tasks.iter().enumerate();
     let remarks = tasks.filter_map(|(number, task)| {
         let TaskKind::Targets(targets) = &task.driver else { return None };
@@ -38,13 +43,15 @@ pub(super) fn unreached_targets_remarks<const D: usize>(
             let found = IkSolver::new(world.rules).solve(&spec.start, &world.obstacles, &goal);
             found.is_ok_and(|result| !result.reached)
         };
-        let unreached = (0..targets.places.len()).filter(|target| is_unreached(*target));
+        let asked = searches.min(targets.places.len());
+        searches -= asked;
+        let unreached = (0..asked).filter(|target| is_unreached(*target));
         let numbers: Vec<String> = unreached.map(|target| target.to_string()).collect();
         if numbers.is_empty() {
             return None;
         }
         let words = format!(
-            "a search found no posture at the targets {}, counted from 0, though the rods reach that far; obstacles, \
+            "a search found no posture at the targets {} of the first {asked}, counted from 0, though the rods reach that far; obstacles, \
              the chain's own body or bend limits may be in the way: move them, or expect `target-given-up`",
             numbers.join(", ")
         );

@@ -49,6 +49,7 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
                 let from = chain.points()[held];
                 let slack_m = targets.tolerance_m + ROUNDING_M;
                 let nearest_m = distance(connector.mobility.project(*target, from), *target);
+                let farthest_m = farthest_m(&connector.mobility, from, *target);
                 let problem = if nearest_m > range.max_m + slack_m {
                     let words = format!(
                         "it is {nearest_m:.4} m from {}, and {} rods reach {:.4} m",
@@ -57,9 +58,9 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
                         range.max_m
                     );
                     Some((words, format!("at most {:.4} m from there", range.max_m)))
-                } else if farthest_m(&connector.mobility, from, *target) < range.min_m - slack_m {
+                } else if farthest_m < range.min_m - slack_m {
                     let words = format!(
-                        "it is {nearest_m:.4} m from {}, and the rods keep at least {:.4} m from there",
+                        "it is at most {farthest_m:.4} m from {}, and the rods keep at least {:.4} m from there",
                         held_place(held, &connector.mobility),
                         range.min_m
                     );

@@ -230,7 +230,9 @@ impl SnapshotComponent for Option<ScatteredPartState> {
         let scattered = self.as_mut().ok_or(CheckpointError::Damaged)?;
         let ways = &record.way_points_m;
         let dimensions = owner.coordinates / owner.connectors.max(1);
-        let has_points = ways.iter().all(|way| way.len() % dimensions.max(1) == 0);
+        let is_finite = |way: &Vec<f64>| way.iter().all(|x| x.is_finite());
+        let has_points =
+            ways.iter().all(|way| way.len() % dimensions.max(1) == 0 && is_finite(way));
         let is_of_parts = ways.is_empty() || ways.len() == scattered.way_count();
         if !has_points || !is_of_parts {
             return Err(CheckpointError::Damaged);

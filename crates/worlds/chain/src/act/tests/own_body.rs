@@ -191,3 +191,13 @@ fn a_path_is_planned_at_once_where_the_straight_way_leads_through_the_chain() {
     events_within_speed(&mut run, 2000, 1.0);
     assert_eq!(run.world().chain_metrics(run.state(), 0).progress, 1.0);
 }
+
+#[test]
+fn nothing_is_planned_for_a_chain_of_short_rods_that_is_in_nobodys_way() {
+    let text = "seed = 1\ncycles = 300\n[[chains]]\nconnectors = 8\nat_m = [0.0, 0.0]\nrod_m = 0.1\nradius_m = 0.08\n\
+                rod_radius_m = 0.04\ntasks = [{ kind = \"targets\", targets_m = [[1.0, 0.0]], speed_m_s = 0.5 }]\n";
+    let mut run = super::run(text);
+    run.advance(300);
+    let metrics = run.metrics();
+    assert_eq!((metrics.progress, metrics.rungs.planned), (1.0, 0));
+}

@@ -43,11 +43,11 @@ struct ActiveExit {
 
 /// Ticks from one choice of an exit to the next: rollouts in every tick would take too long.
 const CHOICE_INTERVAL_TICKS: u32 = 4;
+/// The same while rollouts foresee no contact, and little work is left for them.
+const SAFE_INTERVAL_TICKS: u32 = 3 * CHOICE_INTERVAL_TICKS;
 /// Gap below which a chain is in danger and an exit is searched for, meters: more than the margin of 0.05 m, so that
 /// the search begins while tongs still close. An exit ends at a wider gap, so that it does not end and begin by turns.
 const DANGER_DISTANCE_M: f64 = 0.12;
-/// The same while rollouts foresee no contact, and little work is left for them.
-const SAFE_INTERVAL_TICKS: u32 = 3 * CHOICE_INTERVAL_TICKS;
 /// Least reserve of work with which a choice begins: that of a few whole rollouts of 26 connectors.
 const CHOICE_WORK: u64 = 600_000;
 /// Connectors to either side of those in contact that rollouts include: those farther away hardly move while a part leaves

@@ -60,6 +60,11 @@ impl ExitSearch {
                     break;
                 }
                 let exit_cost = rollout.cost(&RolloutOptions::with_exit(exit), enough, &mut left);
+                if left == 0 && k > first {
+                    // It was cut off, and says nothing: it is the first one next time.
+                    self.next = k as u32;
+                    break;
+                }
                 if exit_cost < enough {
                     enough = exit_cost;
                     cost = exit_cost;
