@@ -239,7 +239,7 @@ mod tests {
             );
             let scenario =
                 ChainScenario::<2>::new(&Source::new("s.toml", text, "")).expect("valid");
-            let all = remarks(&scenario).into_iter().map(|remark| remark.to_string());
+            let all = remarks(&scenario).into_iter().map(|remark| format!("{remark:?}"));
             all.filter(|remark| remark.contains("joint_speed_m_s")).collect::<String>()
         };
         assert!(told("").contains("escape_speed_m_s"), "{}", told(""));
