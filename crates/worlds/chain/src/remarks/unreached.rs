@@ -84,6 +84,9 @@ mod tests {
         let ball = "[[obstacles]]\nat_m = [-0.9, 0.4]\nradius_m = 0.2\n";
         let [(key, words)] = &told(ball)[..] else { panic!("one remark") };
         assert_eq!(key, "chains.0.tasks.0.targets_m");
-        assert!(words.contains("no posture at the targets 1, counted from 0"), "{words}");
+        assert!(
+            words.contains("no posture at the targets 1 of the first 3, counted from 0"),
+            "{words}"
+        );
     }
 }
