@@ -27,7 +27,8 @@ pub struct ReactionRules {
     /// Longest move of any connector in one request that a fixed base answers, meters; infinite for
     /// no limit. Near singular postures the initiator goes only as far as that allows.
     pub joint_step_max_m: f64,
-    /// Longest move of any connector of a chain that nothing holds in one request, meters; infinite for no limit. Rods that
+    /// Longest move of any connector of a chain that nothing holds in one request, meters; infinite for no limit. It is for
+    /// callers that ask for shorter motions, which propagation itself does not. Rods that
     /// turn aside throw the parts that hang on them farther than the initiator goes, which then goes less far.
     pub free_step_max_m: f64,
     /// Number of times that one sweep may try another direction for an earlier slave.

@@ -36,7 +36,7 @@ use sidestep_kernel::InputError;
 use sidestep_kernel::stream::Draws;
 use sidestep_rods::geometry::Point;
 use sidestep_rods::{Chain, Obstacles, ReactionRules};
-pub use space::{ChainConfigurationSpace, HeldEnds, held_ends};
+pub use space::{ChainBases, ChainConfigurationSpace, chain_bases};
 
 /// Largest number of postures at the target from which the second tree grows: some may be cut off from the present
 /// one, and all of them cost searches.

@@ -19,6 +19,8 @@ const MAX_PIECE: f64 = 0.5;
 const MAX_UNEVENNESS: f64 = 2.0;
 /// Bisections of a piece, at most: one that has not come down to a step by then jumps.
 const MAX_BISECTIONS: usize = 24;
+/// Length that a rod has at least on a straight path, as a fraction of the lesser one at both ends of it.
+const MIN_LENGTH_FRACTION: f64 = 0.5;
 /// Distance of an arc from its chord, as a fraction of the squared chord over the radius; twice what it is, because rods
 /// do not turn quite evenly.
 const BOW_HEIGHT: f64 = 0.25;
@@ -113,8 +115,10 @@ fn bow_heights<const D: usize>(chain: &Chain<D>, piece: Piece<'_, D>) -> Vec<f64
     let mut bows_m = vec![0.0];
     for (rod, limits) in chain.rods().iter().enumerate() {
         let [start, end] = [from, to].map(|points| sub(points[rod + 1], points[rod]));
-        // On the way it is never shorter than at both ends, and a bound by its limits could be none: they may be tiny.
-        let shortest_m = norm(start).min(norm(end)).max(limits.min_m);
+        // The limit of its length may be so tiny that the sum would lose all that came before. Between two postures a rod is
+        // as long as at one of them, or somewhat shorter where the ends of the chain are held.
+        let length_m = norm(start).min(norm(end));
+        let shortest_m = limits.min_m.max(MIN_LENGTH_FRACTION * length_m);
         sum_m += BOW_HEIGHT * norm_squared(sub(end, start)) / shortest_m.max(f64::MIN_POSITIVE);
         bows_m.push(sum_m);
     }

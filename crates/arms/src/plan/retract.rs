@@ -18,7 +18,7 @@ const UNBEND_STEPS: usize = 10;
 const UNFOLD_STEPS: usize = 10;
 /// Move of all connectors in so many steps, as a fraction of the longest rod, below which a chain between two ends has
 /// unfolded.
-const REST: f64 = 0.05;
+const MIN_MOVE_FRACTION: f64 = 0.05;
 
 /// Returns postures after the first one, on a way to one of the goals through simple postures, if there is one. A chain
 /// between two ends is led from a simple posture to the target, if it can be.
@@ -62,7 +62,8 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
                 if count % UNFOLD_STEPS != 0 {
                     return false;
                 }
-                let has_come_to_rest = self.distance_m(&before, at) < REST * self.longest_rod_m();
+                let has_come_to_rest =
+                    self.distance_m(&before, at) < MIN_MOVE_FRACTION * self.longest_rod_m();
                 before.clone_from(at);
                 has_come_to_rest
             });

@@ -46,18 +46,18 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
             let remedy = "set planner = \"none\", or give two connectors or more";
             return Err(InputError::new("planner", "a chain without rods has no postures", remedy));
         }
-        let ends = held_ends(chain, k).map_err(|[low, high]| held_twice_error(low, high))?;
+        let ends = chain_bases(chain, k).map_err(|[low, high]| held_twice_error(low, high))?;
         let up = |from: usize, to: usize| (from..=to).collect::<Vec<usize>>();
         let down = |from: usize| (0..=from).rev().collect::<Vec<usize>>();
         let (root, far_end, limbs) = match ends {
-            HeldEnds::Two([low, high]) => (low, Some(high), vec![up(low, high)]),
-            HeldEnds::One(root) if chain.connectors()[root].is_still() => {
+            ChainBases::Two([low, high]) => (low, Some(high), vec![up(low, high)]),
+            ChainBases::One(root) if chain.connectors()[root].is_still() => {
                 // What lies behind a base stays where it is.
                 (root, None, vec![if root < k { up(root, n - 1) } else { down(root) }])
             }
-            HeldEnds::One(root) => (root, None, vec![up(root, n - 1), down(root)]),
+            ChainBases::One(root) => (root, None, vec![up(root, n - 1), down(root)]),
             // The end that is farther away swings about the nearer part.
-            HeldEnds::None => {
+            ChainBases::None => {
                 let root = if 2 * k < n { n - 1 } else { 0 };
                 (root, None, vec![up(root, n - 1), down(root)])
             }
@@ -218,9 +218,9 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
     }
 }
 
-/// The connectors that hold a chain where one of its connectors is led.
+/// The bases of a chain one of whose connectors is led: the connectors that hold it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum HeldEnds {
+pub enum ChainBases {
     /// None: the chain is free.
     None,
     /// The one on which the chain hangs.
@@ -234,25 +234,25 @@ pub enum HeldEnds {
 /// # Errors
 /// Two of them, the lower one first, if paths of the chain cannot be planned: those that are held, or have failed, on both
 /// sides of `k` must be fixed; on one side another one may be behind one that is fixed.
-pub fn held_ends<const D: usize>(chain: &Chain<D>, k: usize) -> Result<HeldEnds, [usize; 2]> {
+pub fn chain_bases<const D: usize>(chain: &Chain<D>, k: usize) -> Result<ChainBases, [usize; 2]> {
     let connectors = chain.connectors();
     let is_held = |c: &Connector<D>| c.failed || c.mobility != Mobility::Free;
     let below = (0..k).rev().find(|&i| is_held(&connectors[i]));
     let above = (k + 1..connectors.len()).find(|&i| is_held(&connectors[i]));
     let root = match (below, above) {
-        (None, None) => return Ok(HeldEnds::None),
+        (None, None) => return Ok(ChainBases::None),
         (Some(root), None) | (None, Some(root)) => root,
         (Some(low), Some(high)) => {
             let are_still = connectors[low].is_still() && connectors[high].is_still();
-            return if are_still { Ok(HeldEnds::Two([low, high])) } else { Err([low, high]) };
+            return if are_still { Ok(ChainBases::Two([low, high])) } else { Err([low, high]) };
         }
     };
     if connectors[root].is_still() {
-        return Ok(HeldEnds::One(root));
+        return Ok(ChainBases::One(root));
     }
     // All of the chain moves with a base that does, and no other connector may hold it.
     let other = (0..connectors.len()).find(|&i| i != root && i != k && is_held(&connectors[i]));
-    other.map_or(Ok(HeldEnds::One(root)), |other| Err([root.min(other), root.max(other)]))
+    other.map_or(Ok(ChainBases::One(root)), |other| Err([root.min(other), root.max(other)]))
 }
 
 fn held_twice_error(low: usize, high: usize) -> InputError {

@@ -20,8 +20,8 @@ const MAX_STEPS: usize = 3_000;
 const MAX_EFFORT: usize = MAX_STEPS * 64 * 64;
 /// Longest and shortest step of a connector, as fractions of the longest rod: a step that is not free, or leads uphill, is
 /// halved, and one that is free is longer next time.
-const LONGEST_STEP: f64 = 0.5;
-const SHORTEST_STEP: f64 = 1e-5;
+const MAX_STEP_FRACTION: f64 = 0.5;
+const MIN_STEP_FRACTION: f64 = 1e-5;
 /// Longest step of an initiator that is led, as a fraction of the longest rod.
 const LED_STEP: f64 = 0.1;
 /// Growth of steps that succeed.
@@ -48,14 +48,14 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         let rod_m = self.longest_rod_m();
         let mut postures = Vec::new();
         let mut at = from.clone();
-        let mut step_m = LONGEST_STEP * rod_m;
+        let mut step_m = MAX_STEP_FRACTION * rod_m;
         let rods = self.chain().rods().len().max(1);
         let steps = MAX_STEPS.min(MAX_EFFORT / (rods * rods));
         for _ in 0..steps {
             interrupt::check();
             let (energy, forces) = self.repulsion(&at);
             let mut moved = None;
-            while moved.is_none() && step_m >= SHORTEST_STEP * rod_m {
+            while moved.is_none() && step_m >= MIN_STEP_FRACTION * rod_m {
                 moved = self
                     .pushed_posture(&at, &forces, step_m)
                     .filter(|next| self.repulsion(next).0 < energy && self.is_path_free(&at, next));
@@ -64,7 +64,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
                 }
             }
             let Some(next) = moved else { break };
-            step_m = (STEP_GROWTH * step_m).min(LONGEST_STEP * rod_m);
+            step_m = (STEP_GROWTH * step_m).min(MAX_STEP_FRACTION * rod_m);
             at = next;
             postures.push(at.clone());
             if is_enough(&at) {
@@ -231,7 +231,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
                 }
                 None => step_m *= 0.5,
             }
-            if step_m < SHORTEST_STEP * rod_m {
+            if step_m < MIN_STEP_FRACTION * rod_m {
                 return None;
             }
         }

@@ -39,7 +39,11 @@ fn cycle_reach_box<const D: usize>(
     let chain = &body.chain;
     let radius_m = chain.connectors().iter().map(|c| c.radius_m).fold(0.0, f64::max);
     let longest_m = chain.rods().iter().map(|r| r.max_m).fold(0.0, f64::max);
-    let fastest_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(0.0, f64::max);
+    let gathering_m_s = body.scattered.as_ref().map_or(0.0, |scattered| scattered.speed_m_s);
+    let changes = spec.changes.iter();
+    let back_m_s = changes.map(|change| change.gather_speed_m_s(now)).fold(gathering_m_s, f64::max);
+    // An end that comes back is led as a chain is.
+    let fastest_m_s = spec.tasks.iter().map(|t| t.speed_m_s).fold(back_m_s, f64::max);
     let moved_m = match &world.escape {
         Some(escape) => escape.speed_max_m_s * world.dt_s,
         // A rod that turns aside for an obstacle can swing as far as its length to either side.
@@ -52,9 +56,6 @@ fn cycle_reach_box<const D: usize>(
     };
     // Changes take effect in the cycle that follows the claim.
     let thrown_m = spec.changes.iter().map(|change| change.max_scatter_m(now)).fold(0.0, f64::max);
-    let gathering_m_s = body.scattered.as_ref().map_or(0.0, |scattered| scattered.speed_m_s);
-    let changes = spec.changes.iter();
-    let back_m_s = changes.map(|change| change.gather_speed_m_s(now)).fold(gathering_m_s, f64::max);
     let chain_box = Aabb::from_points(chain.points())
         .joined(&reference_box(spec, body))
         .grown(radius_m + moved_m + thrown_m + back_m_s * world.dt_s);

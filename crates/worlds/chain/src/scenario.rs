@@ -508,7 +508,8 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
         Err(self.source.unused_key(&format!("chain.{key}"), &format!("with escape = {because}")))
     }
 
-    /// Returns the greatest speed of any connector of a chain, m/s; by default twice that at which one is led.
+    /// Returns the greatest speed of any connector of a chain that is held, or whose own body is solid and where no part
+    /// escapes, m/s; by default twice that at which one is led.
     fn joint_speed_m_s(&self, chains: &[ChainSpec<D>]) -> f64 {
         let led = chains.iter().flat_map(|spec| &spec.tasks).map(|task| task.speed_m_s);
         let usual_m_s = FAST_FACTOR * led.fold(0.0, f64::max);

@@ -60,7 +60,8 @@ fn apply_change<const D: usize>(
             sink.record(&body.chain, EventKind::Broken, *connectors.start(), n);
         }
         ChainChangeKind::Reform { may_come, speed_m_s } => {
-            start_reform(context, body, sink, (*may_come, *speed_m_s));
+            let order = ReformOrder { may_come: *may_come, speed_m_s: *speed_m_s };
+            start_reform(context, body, sink, order);
         }
     }
 }
@@ -102,13 +103,20 @@ fn scatter<const D: usize>(
     });
 }
 
+/// How the scattered parts of a chain are to come back.
+struct ReformOrder {
+    /// The end that comes with them if they are too few.
+    may_come: MovableEnd,
+    speed_m_s: f64,
+}
+
 /// Finds the places where the scattered parts have to be, and their ways there. A chain that an earlier change has joined
 /// stays as it is.
 fn start_reform<const D: usize>(
     context: ChainContext<'_, D>,
     body: &mut ChainBodyState<D>,
     sink: &mut EventSink<'_, D>,
-    (may_come, speed_m_s): (MovableEnd, f64),
+    ReformOrder { may_come, speed_m_s }: ReformOrder,
 ) {
     let Some(scattered) = &mut body.scattered else { return };
     let first = scattered.first as usize;

@@ -6,7 +6,7 @@ use super::{ChainContext, ChainCycleState};
 use crate::events::{Event, EventKind};
 use crate::state::{ChainBodyState, unflatten};
 use sidestep_kernel::Cycle;
-use sidestep_rods::geometry::{Point, move_toward};
+use sidestep_rods::geometry::{Aabb, Point, move_toward};
 use sidestep_rods::{
     Chain, MotionOutcome, MotionRequest, Obstacles, Propagator, RodSweep, TOLERANCE_M,
     blocking_obstacle,
@@ -45,6 +45,8 @@ struct ScatteredParts<'a, const D: usize> {
     ways: &'a mut [Vec<f64>],
     obstacles: &'a Obstacles<D>,
     propagator: &'a mut Propagator<D>,
+    /// The box that an end may enter; none where no other chain relies on it.
+    claim: Option<Aabb<D>>,
     /// The last whole connector before the scattered ones, and the first whole one after them.
     stubs: [usize; 2],
     /// Longest motion of a part in a cycle, meters.
@@ -56,6 +58,7 @@ struct ScatteredParts<'a, const D: usize> {
 pub(super) fn gather_parts<const D: usize>(
     context: ChainContext<'_, D>,
     acting: &mut ChainCycleState<'_, D>,
+    claim: Aabb<D>,
 ) {
     let ChainCycleState { body, propagator, sink, .. } = acting;
     let ChainBodyState { chain, scattered, .. } = &mut **body;
@@ -70,7 +73,10 @@ pub(super) fn gather_parts<const D: usize>(
     let obstacles = context.obstacles;
     let ways = &mut scattered.way_points_m;
     let stubs = [first - 1, last + 1];
-    let mut parts = ScatteredParts { chain, goals, ways, obstacles, propagator, stubs, step_m };
+    // No other chain relies on the claim of the only one.
+    let claim = (context.world.chains.len() > 1).then_some(claim);
+    let mut parts =
+        ScatteredParts { chain, goals, ways, obstacles, propagator, claim, stubs, step_m };
     let attempt = parts.advance();
     if !parts.have_arrived() {
         return wait_or_give_up(context, body, sink, &attempt);
@@ -174,6 +180,8 @@ impl<const D: usize> ScatteredParts<'_, D> {
             let Ok(mut alone) = self.chain.part(end.clone()) else { return attempt };
             let outcome = self.propagator.propagate(&mut alone, self.obstacles, &request);
             match outcome {
+                // A rod that turns aside throws others far; a shorter step throws them less far.
+                Ok(MotionOutcome::Moved(_)) if !self.may_be_at(alone.points()) => {}
                 Ok(MotionOutcome::Moved(_)) => {
                     self.chain.points_mut()[end].copy_from_slice(alone.points());
                     self.leave_way_point(stub, next);
@@ -186,6 +194,13 @@ impl<const D: usize> ScatteredParts<'_, D> {
             }
         }
         attempt
+    }
+
+    /// Returns whether the connectors of an end may be at some places, because the chain has claimed them.
+    fn may_be_at(&self, points: &[Point<D>]) -> bool {
+        let is_in =
+            |claim: Aabb<D>| points.iter().all(|p| claim.intersects(&Aabb::from_points(&[*p])));
+        self.claim.is_none_or(is_in)
     }
 
     /// Returns the next way point of a connector, after the last one its goal.

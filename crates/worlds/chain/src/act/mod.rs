@@ -179,7 +179,7 @@ fn run_cycle<const D: usize>(
         return;
     }
     if acting.body.scattered.is_some() {
-        gather::gather_parts(context, &mut acting);
+        gather::gather_parts(context, &mut acting, claim);
     } else {
         act_whole_chain(context, &mut acting, &mut escaping, inputs, follows);
     }

@@ -14,6 +14,11 @@ const MIN_SPREAD_RADII: f64 = 20.0;
 /// way.
 const ROOM_SIZES: u32 = 7;
 
+/// Random places that searches for ways try, those of all parts of a chain together and those of one part: all ways are
+/// planned in one cycle.
+const MAX_CHAIN_SAMPLES: usize = 40_000;
+const MAX_PART_SAMPLES: usize = 2_000;
+
 /// Plans the ways of all scattered connectors, and of the stubs beside them, whose straight way to their goals is blocked by
 /// one of these obstacles. Where no way is found the part keeps to the straight one, and waits where it is blocked.
 pub(super) fn plan_part_ways<const D: usize>(
@@ -25,6 +30,7 @@ pub(super) fn plan_part_ways<const D: usize>(
     let goals: Vec<Point<D>> = unflatten(&scattered.goals_m);
     let chain = &body.chain;
     let mut ways = Vec::with_capacity(scattered.way_count());
+    let max_samples = MAX_PART_SAMPLES.min(MAX_CHAIN_SAMPLES / scattered.way_count());
     let with_ways = scattered.first as usize - 1..=scattered.last as usize + 1;
     for k in with_ways {
         let space = PartSpace {
@@ -32,6 +38,7 @@ pub(super) fn plan_part_ways<const D: usize>(
             radius_m: chain.connectors()[k].radius_m,
             from: chain.points()[k],
             goal: goals[k],
+            max_samples,
         };
         let mut way = space.way_points(draws).unwrap_or_default();
         // The goal itself is where the parts go anyway.
@@ -56,6 +63,7 @@ struct PartSpace<'a, const D: usize> {
     radius_m: f64,
     from: Point<D>,
     goal: Point<D>,
+    max_samples: usize,
 }
 
 impl<const D: usize> PartSpace<'_, D> {
@@ -72,6 +80,10 @@ impl<const D: usize> PartSpace<'_, D> {
 
 impl<const D: usize> ConfigurationSpace for PartSpace<'_, D> {
     type Posture = Point<D>;
+
+    fn max_samples(&self) -> usize {
+        self.max_samples
+    }
 
     fn present_posture(&self) -> Point<D> {
         self.from
@@ -121,8 +133,13 @@ mod tests {
     #[test]
     fn a_stride_that_reaches_beyond_a_posture_ends_at_it() {
         let ball = Obstacles::new(vec![Obstacle::ball(0, [1.0, 0.0], 0.5)], 1.0).expect("a ball");
-        let space =
-            PartSpace { obstacles: &ball, radius_m: 0.05, from: [0.0; 2], goal: [2.0, 0.0] };
+        let space = PartSpace {
+            obstacles: &ball,
+            radius_m: 0.05,
+            from: [0.0; 2],
+            goal: [2.0, 0.0],
+            max_samples: 1,
+        };
         assert_eq!(space.interpolate(&[0.0; 2], &[0.3, 0.1], 1.7), [0.3, 0.1]);
         assert_eq!(space.interpolate(&[0.0; 2], &[0.3, 0.1], 0.5), [0.15, 0.05]);
     }

@@ -52,9 +52,7 @@ fn propagate_slowed<const D: usize>(
     (k, to): (usize, Point<D>),
 ) -> Result<MotionOutcome<D>, InputError> {
     let most_m = scene.propagator.rules.free_step_max_m;
-    let can_turn = scene.propagator.rules.self_collision || !scene.obstacles.is_empty();
-    // Parts that are pushed or pulled go no farther than what moves them.
-    if !can_turn || most_m == f64::INFINITY {
+    if most_m == f64::INFINITY {
         return scene.propagator.propagate(chain, scene.obstacles, request);
     }
     try_slowed(chain, k, to, most_m, |chain, _, target| {

@@ -3,7 +3,7 @@
 use crate::driver::TaskKind;
 use crate::world::{ChainSpec, ChainWorld};
 use sidestep_arms::ik::{ChainIkGoal, IkEngine, IkSolver};
-use sidestep_arms::plan::{HeldEnds, held_ends};
+use sidestep_arms::plan::{ChainBases, chain_bases};
 use sidestep_scenario::Remark;
 
 /// Postures from which one at a target is sought: few, because all targets of a scenario are asked.
@@ -29,7 +29,7 @@ pub(super) fn unreached_targets_remarks<const D: usize>(
     let tasks = spec.tasks.iter().enumerate();
     let remarks = tasks.filter_map(|(number, task)| {
         let TaskKind::Targets(targets) = &task.driver else { return None };
-        let Ok(HeldEnds::One(base)) = held_ends(&spec.start, task.agent) else { return None };
+        let Ok(ChainBases::One(base)) = chain_bases(&spec.start, task.agent) else { return None };
         if !spec.start.connectors()[base].is_still() {
             return None;
         }

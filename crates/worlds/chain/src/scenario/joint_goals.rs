@@ -63,6 +63,12 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             let cause = "a tool comes to rest at each end of a straight line";
             return Err(self.source.error(at, cause, "leave blend_m or path out"));
         }
+        let count = s.joints.as_ref().map_or(targets.places.len(), Vec::len);
+        if s.blend_m.is_some() && count == 1 {
+            let at = self.source.key_span(at, &["blend_m"]);
+            let cause = "a tool comes to rest at its last target, and there is no other one";
+            return Err(self.source.error(at, cause, "give another target, or leave blend_m out"));
+        }
         if let Some(values) = &s.joints {
             return self.joint_values(s, arm, values, at);
         }

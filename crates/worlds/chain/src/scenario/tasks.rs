@@ -11,7 +11,7 @@ use super::{BoxSection, ChainScenarioCompiler, MAX_VALUE, PointValue, PositiveNu
 use schemars::JsonSchema;
 use serde::Deserialize;
 use sidestep_arms::Arm;
-use sidestep_arms::plan::{HeldEnds, held_ends};
+use sidestep_arms::plan::{ChainBases, chain_bases};
 use sidestep_kernel::InputError;
 use sidestep_rods::{Chain, Mobility};
 use sidestep_scenario::{ByName, Spanned};
@@ -189,9 +189,9 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
     /// always, and otherwise where its own body can be in its way and plans are cheap and stay right, because the chain is
     /// short, moved as a whole, and nothing moves around it.
     fn plans_usually(&self, is_swarm: bool, chain: &Chain<D>, k: usize) -> bool {
-        let ends = held_ends(chain, k);
+        let ends = chain_bases(chain, k);
         let has_base = match ends {
-            Ok(HeldEnds::One(base)) => chain.connectors()[base].mobility == Mobility::Fixed,
+            Ok(ChainBases::One(base)) => chain.connectors()[base].mobility == Mobility::Fixed,
             _ => false,
         };
         let is_alone = self.file.chain.deployment == Deployment::Direct
@@ -217,7 +217,9 @@ impl<const D: usize> ChainScenarioCompiler<'_, D> {
             let remedy = "leave it out: there are no rods whose posture it could plan";
             return Err(self.source.error(planner_span(), cause, remedy));
         }
-        let Err([low, high]) = held_ends(chain, section.get_ref().connector) else { return Ok(()) };
+        let Err([low, high]) = chain_bases(chain, section.get_ref().connector) else {
+            return Ok(());
+        };
         let cause = format!(
             "a planner for a chain that is held at connectors {low} and {high}, and not both are fixed"
         );

@@ -62,16 +62,20 @@ fn a_tool_passes_all_targets_but_the_last_within_its_blend_distance_without_stop
 
 #[test]
 fn what_cannot_blend_is_refused() {
-    let cause = |chain: &str, more: &str| {
+    let cause_of = |targets_m: &str, chain: &str, more: &str| {
         let text = format!(
             "format = 1\nworld = \"chain\"\n[chain]\ndimensions = 3\n[[chains]]\n{chain}\n[[chains.tasks]]\n\
-             kind = \"targets\"\nconnector = 3\ntargets_m = [[0.4, 0.1, 0.6]]\nblend_m = 0.05\n{more}"
+             kind = \"targets\"\nconnector = 3\ntargets_m = {targets_m}\nblend_m = 0.05\n{more}"
         );
         let source = Source::new("s.toml", &text, root());
         ChainScenario::<3>::new(&source).err().map(|error| error.cause().to_string())
     };
+    let cause =
+        |chain: &str, more: &str| cause_of("[[0.4, 0.1, 0.6], [0.4, -0.1, 0.6]]", chain, more);
     let reacher = format!("arm = {{ urdf = {} }}\nradius_m = 0.02", shipped());
     assert_eq!(cause(&reacher, ""), None);
+    let alone = cause_of("[[0.4, 0.1, 0.6]]", &reacher, "").expect("one target");
+    assert!(alone.contains("no other one"), "{alone}");
     let line = cause(&reacher, "path = \"line\"").expect("a line");
     assert!(line.contains("comes to rest"), "{line}");
     let rods = cause("connectors = 4\nrod_m = 0.3\nradius_m = 0.02", "").expect("no arm");

@@ -10,7 +10,7 @@ use sidestep_rods::ChainPart;
 const ENDANGERED_DISTANCE_M: f64 = 0.24;
 /// Connectors between two groups at least: as many as rollouts include on both sides of one.
 const GROUP_DISTANCE: usize = 24;
-/// Connectors up to which several groups are rolled out together.
+/// Connectors up to which groups are rolled out together, and a long group as a whole.
 const MAX_CONNECTORS: usize = 100;
 
 /// A connector near an obstacle, itself or by the rod behind it.
@@ -61,17 +61,33 @@ pub(super) fn group_to_save(
     };
     let nearest = groups().min_by(|a, b| least_gap_m(a).total_cmp(&least_gap_m(b)));
     let Some(nearest) = nearest else { return endangered };
-    let Some(exit) = exit else { return nearest };
+    let Some(exit) = exit else { return around_nearest(nearest, |_| true) };
     let is_at_exit =
         |group: &&[EndangeredConnector]| group.iter().any(|endangered| endangered.obstacle == exit);
+    let at_exit = |endangered: &EndangeredConnector| endangered.obstacle == exit;
     if is_at_exit(&nearest) {
-        return nearest;
+        return around_nearest(nearest, at_exit);
     }
     let last = endangered.len() - 1;
     if endangered[last].k - endangered[0].k < MAX_CONNECTORS {
         return endangered;
     }
-    groups().find(is_at_exit).unwrap_or(nearest)
+    let group = groups().find(is_at_exit);
+    group.map_or(around_nearest(nearest, |_| true), |group| around_nearest(group, at_exit))
+}
+
+/// Returns the part of a group around the one of some of its connectors that is nearest to an obstacle: a chain that is hemmed
+/// in along all of its length is one group, and a rollout of all of it would take the work of several seconds.
+fn around_nearest(
+    group: &[EndangeredConnector],
+    counts: impl Fn(&EndangeredConnector) -> bool,
+) -> &[EndangeredConnector] {
+    let some = group.iter().filter(|endangered| counts(endangered));
+    let nearest = some.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
+    let Some(middle) = nearest.map(|endangered| endangered.k) else { return group };
+    let from = group.partition_point(|endangered| endangered.k + MAX_CONNECTORS / 2 < middle);
+    let to = group.partition_point(|endangered| endangered.k <= middle + MAX_CONNECTORS / 2);
+    &group[from..to]
 }
 
 #[cfg(test)]
@@ -85,6 +101,19 @@ mod tests {
             obstacle,
             gap_m,
         })
+    }
+
+    #[test]
+    fn of_a_group_as_long_as_a_snake_the_part_around_its_nearest_connector_is_saved() {
+        let long: Vec<_> = (0..20).flat_map(|k| group(20 * k, 1, 0.2)).collect();
+        let mut hemmed_in = long.clone();
+        hemmed_in[21].gap_m = 0.01;
+        let saved = group_to_save(&hemmed_in, None);
+        let middle = hemmed_in[21].k;
+        assert!(saved.iter().any(|endangered| endangered.gap_m == 0.01));
+        assert!(saved.iter().all(|endangered| endangered.k.abs_diff(middle) <= 50));
+        assert!(saved[saved.len() - 1].k - saved[0].k >= 80, "{saved:?}");
+        assert_eq!(group_to_save(&long[..4], Some(1)), &long[..4]);
     }
 
     #[test]

@@ -101,11 +101,7 @@ impl<'a, const D: usize> Rollout<'a, D> {
     ) -> Option<Self> {
         let (from, to) = between.into_inner();
         let EscapeSolveInput { chain, obstacles, max_step_m, .. } = *input;
-        let cut = Chain::new_broken(
-            chain.points()[from..=to].to_vec(),
-            chain.connectors()[from..=to].to_vec(),
-            chain.rods()[from..to].to_vec(),
-        );
+        let cut = chain.part(from..to + 1);
         let horizon_s = MAX_HORIZON_S.min(MAX_TICKS as f64 * rules.dt_s);
         let middle = chain.points()[usize::midpoint(from, to)];
         let reach_m: f64 = chain.rods()[from..to].iter().map(|rod| rod.max_m).sum();
