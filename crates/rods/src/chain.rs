@@ -330,7 +330,12 @@ impl<const D: usize> Chain<D> {
     /// Returns the greatest amount by which a rod is outside its limits, meters; 0 if all are
     /// inside.
     pub fn max_rod_violation_m(&self) -> f64 {
-        (0..self.rods.len()).map(|i| self.rod_violation_m(i)).fold(0.0, f64::max)
+        self.max_rod_violation_of_first_m(self.rods.len())
+    }
+
+    /// Returns the same of the first rods, meters.
+    pub(super) fn max_rod_violation_of_first_m(&self, rods: usize) -> f64 {
+        (0..rods).map(|i| self.rod_violation_m(i)).fold(0.0, f64::max)
     }
 
     /// Returns the amount by which a rod is outside its limits, meters; negative inside.
@@ -366,6 +371,11 @@ impl<const D: usize> Chain<D> {
     /// Returns the greatest length of any rod, meters.
     pub fn max_rod_m(&self) -> f64 {
         self.measures.max_rod_m
+    }
+
+    /// Returns the least length that a rod may have, meters; infinite without rods.
+    pub(super) fn min_rod_m(&self) -> f64 {
+        self.measures.min_rod_m
     }
 
     /// Returns the greatest radius of any part, meters; no rod is thicker than its connectors.

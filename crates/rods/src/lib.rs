@@ -29,6 +29,7 @@ mod rod_bvh;
 mod rules;
 mod search;
 pub mod serde_point;
+mod solid_motions;
 mod span;
 mod sweep;
 mod tunneling;
@@ -53,6 +54,7 @@ pub use reaction::{MasterMove, Reaction};
 pub use rod_bvh::RodBvh;
 pub use rules::{ReactionRules, RotationRule};
 pub use sidestep_kernel::InputError;
+pub use solid_motions::DeferredSolidMotions;
 pub use sweep::RodSweep;
 pub use tunneling::{TunneledRod, blocking_obstacle, find_tunneling};
 pub use veto::{

@@ -23,6 +23,10 @@ use super::rod_bvh::RodBvh;
 use super::sweep::{RodPairSweep, RodSweep};
 use std::ops::Range;
 
+mod foresight;
+
+pub(super) use foresight::NextMotions;
+
 /// Distance that is kept beyond the one needed, meters: far more than rounding.
 const MARGIN_M: f64 = 1e-8;
 /// Part of it that a gap measured earlier must have left, meters: far more than rounding, so that it would also
@@ -56,6 +60,14 @@ pub(super) struct ProvenMotion {
     pub(super) in_turn: bool,
 }
 
+/// The gap that rods are to have from parts that are not near them along the chain.
+#[derive(Debug, Clone, Copy)]
+struct NeededGap {
+    needed_m: f64,
+    /// See [`ProvenMotion::in_turn`].
+    in_turn: bool,
+}
+
 /// Gaps of elements (rods, or blocks of them) from all others, with the travel since.
 #[derive(Debug, Clone, Default)]
 struct GapBudget<const D: usize> {
@@ -73,11 +85,12 @@ impl<const D: usize> GapBudget<D> {
         self.built_at_m = f64::NEG_INFINITY;
     }
 
-    /// Brings the boxes up to date, unless they are right enough to look for elements within `search_m`.
-    fn refresh(&mut self, search_m: f64, odometer_m: f64, bounds: impl Iterator<Item = Aabb<D>>) {
-        if odometer_m - self.built_at_m > STALE_FRACTION * search_m {
+    /// Brings the boxes up to date, unless they are right enough to look for elements within `search_m`; up to date they
+    /// are right for the reading `now_m` of the odometer.
+    fn refresh(&mut self, search_m: f64, now_m: f64, bounds: impl Iterator<Item = Aabb<D>>) {
+        if now_m - self.built_at_m > STALE_FRACTION * search_m {
             self.tree.rebuild(bounds);
-            self.built_at_m = odometer_m;
+            self.built_at_m = now_m;
         }
     }
 
@@ -124,6 +137,10 @@ pub(super) struct SeparationBounds<const D: usize> {
     /// Twice the sum of the longest travel of each motion so far, meters: two parts approach each other at
     /// most by the travel of both.
     odometer_m: f64,
+    /// Distance that connectors may be from where the chain has them, because they have yet to follow, meters.
+    lag_m: f64,
+    /// The first rod with such a connector, if there are any.
+    first_lagging_rod: usize,
     rods: GapBudget<D>,
     blocks: GapBudget<D>,
 }
@@ -145,6 +162,7 @@ impl<const D: usize> SeparationBounds<D> {
 
     /// Forgets all distances.
     fn reset(&mut self, chain: &Chain<D>) {
+        self.lag_m = 0.0;
         self.points.clear();
         self.points.extend_from_slice(chain.points());
         self.sizes.clear();
@@ -178,26 +196,36 @@ impl<const D: usize> SeparationBounds<D> {
     /// Returns whether a motion from the recorded positions to where the chain is now brings no two parts too near each
     /// other, neither at its end nor on its path.
     pub(super) fn allows(&mut self, chain: &Chain<D>, motion: &ProvenMotion) -> bool {
+        self.allows_first(chain, motion, chain.rods().len())
+    }
+
+    /// Returns the same of a motion whose first rods, up to `end`, have made it, where nothing can object to what the
+    /// others do. `end` is where a stretch ends.
+    pub(super) fn allows_first(
+        &mut self,
+        chain: &Chain<D>,
+        motion: &ProvenMotion,
+        end: usize,
+    ) -> bool {
         self.add_travel(motion.travel_m);
-        // On the path both parts were up to the travel from where they are at its end, and the test of paths adds it
-        // once more.
-        let needed_m = 3.0 * motion.travel_m + MARGIN_M;
+        let needed_m = needed_gap_m(motion.travel_m);
+        let needs = NeededGap { needed_m, in_turn: motion.in_turn };
         let rods = chain.rods().len();
-        for stretch in stretches(rods) {
+        for stretch in stretches(rods).take_while(|stretch| stretch.end <= end) {
             let has_moved = motion.moved.start <= stretch.end && stretch.start < motion.moved.end;
             if has_moved
                 && (motion.in_turn || !self.is_monotone(chain, stretch.clone()))
                 && !(self.are_neighbors_apart(chain, stretch.clone())
-                    && self.are_rods_apart(chain, stretch, needed_m))
+                    && self.are_rods_apart(chain, stretch, needs))
             {
                 return false;
             }
         }
         // In a single stretch all pairs have been seen.
         rods <= STRETCH
-            || (0..rods.div_ceil(BLOCK)).all(|block| {
+            || (0..end.div_ceil(BLOCK)).all(|block| {
                 self.is_block_apart(chain, block, needed_m)
-                    || self.are_rods_apart(chain, block_rods(block, rods), needed_m)
+                    || self.are_rods_apart(chain, block_rods(block, rods), needs)
             })
     }
 
@@ -223,18 +251,7 @@ impl<const D: usize> SeparationBounds<D> {
     /// Returns whether the parts of a stretch that are near each other along the chain keep their distances, at the
     /// end of the motion and on its path.
     fn are_neighbors_apart(&self, chain: &Chain<D>, stretch: Range<usize>) -> bool {
-        let part_sweep = |part: ChainPart| RodSweep {
-            from: part.ends(&self.points),
-            to: part.ends(chain.points()),
-        };
-        let is_apart = |one: ChainPart, other: ChainPart| {
-            let Some(separation_m) = chain.min_separation_m(one, other) else { return true };
-            let pair = RodPairSweep { one: part_sweep(one), other: part_sweep(other) };
-            let contact_m = contact_distance_m(separation_m);
-            let is_apart_at_end = are_segments_surely_apart(pair.one.to, pair.other.to, contact_m)
-                || distance_of_segments_m(pair.one.to, pair.other.to) >= contact_m;
-            is_apart_at_end && pair.is_clear(separation_m)
-        };
+        let is_apart = |one: ChainPart, other: ChainPart| self.is_pair_apart(chain, [one, other]);
         let clears_right_angles = chain.clears_right_angles();
         let mut was_open = false;
         for k in stretch.start + 2..stretch.end + 1 {
@@ -257,6 +274,20 @@ impl<const D: usize> SeparationBounds<D> {
         true
     }
 
+    /// Returns whether two parts keep their distance at the end of the motion and on its path.
+    fn is_pair_apart(&self, chain: &Chain<D>, [one, other]: [ChainPart; 2]) -> bool {
+        let Some(separation_m) = chain.min_separation_m(one, other) else { return true };
+        let part_sweep = |part: ChainPart| RodSweep {
+            from: part.ends(&self.points),
+            to: part.ends(chain.points()),
+        };
+        let pair = RodPairSweep { one: part_sweep(one), other: part_sweep(other) };
+        let contact_m = contact_distance_m(separation_m);
+        let is_apart_at_end = are_segments_surely_apart(pair.one.to, pair.other.to, contact_m)
+            || distance_of_segments_m(pair.one.to, pair.other.to) >= contact_m;
+        is_apart_at_end && pair.is_clear(separation_m)
+    }
+
     /// Returns whether the bend at a connector is a right angle at most, all the way: the product of the rods'
     /// directions, a parabola of the time, lies within its Bezier coefficients.
     fn stays_open(&self, chain: &Chain<D>, k: usize) -> bool {
@@ -268,20 +299,47 @@ impl<const D: usize> SeparationBounds<D> {
         least.min(dot(into_was, out) + dot(into, out_was)) >= 0.0
     }
 
-    /// Returns whether some rods and their connectors are at least `needed_m` from all parts that are not near them
-    /// along the chain.
-    fn are_rods_apart(&mut self, chain: &Chain<D>, rods: Range<usize>, needed_m: f64) -> bool {
+    /// Returns whether some rods and their connectors have the gap that is needed to all parts that are not near them
+    /// along the chain, or keep their distances from each of these.
+    fn are_rods_apart(&mut self, chain: &Chain<D>, rods: Range<usize>, needs: NeededGap) -> bool {
+        let NeededGap { needed_m, in_turn } = needs;
         for rod in rods {
             if self.rods.until_m[rod] - self.odometer_m >= needed_m + SLACK_M {
                 continue;
             }
             let gap_m = self.measure_rod_gap_m(chain, rod, needed_m);
             self.rods.until_m[rod] = self.odometer_m + gap_m;
-            if gap_m < needed_m {
+            // Paths that are clear for parts which move at once may not be for those that move one after the other.
+            if gap_m < needed_m && (in_turn || !self.is_rod_apart(chain, rod, needed_m)) {
                 return false;
             }
         }
         true
+    }
+
+    /// Returns whether a rod and its connectors keep their distances from all parts within `needed_m` that are not near
+    /// them along the chain, at the end of the motion and on its path.
+    fn is_rod_apart(&self, chain: &Chain<D>, rod: usize, needed_m: f64) -> bool {
+        let points = chain.points();
+        let ends = |rod: usize| [points[rod], points[rod + 1]];
+        let near = Aabb::from_points(&ends(rod));
+        let rods = chain.rods().len();
+        let reach_m = needed_m + self.lag_m + 2.0 * chain.max_radius_m();
+        let mut is_apart = true;
+        self.rods.visit_near(&near, reach_m, self.odometer_m, |other| {
+            if !is_apart
+                || other == rod
+                || are_segments_surely_apart(ends(rod), ends(other), reach_m)
+            {
+                return;
+            }
+            // Nobody knows the path of a rod that has yet to follow.
+            is_apart = self.rod_lag_m(rod.max(other)) == 0.0
+                && part_pairs(rod.min(other), rod.max(other), rods).all(|[one, other]| {
+                    one.is_near_along_chain(other) || self.is_pair_apart(chain, [one, other])
+                });
+        });
+        is_apart
     }
 
     /// Returns the gap between a rod with its connectors and all parts that can be in their way, up to the distance
@@ -294,22 +352,29 @@ impl<const D: usize> SeparationBounds<D> {
         let near = Aabb::from_points(&ends(rod));
         let bounds = points.windows(2).map(Aabb::from_points);
         let rods = chain.rods().len();
-        let mut gap_m = search_m;
-        self.rods.refresh(search_m + thickness_m, self.odometer_m, bounds);
+        let mut gap_m = search_m - self.lag_m;
+        let up_to_date_m = self.odometer_m - 2.0 * self.lag_m;
+        self.rods.refresh(search_m + thickness_m, up_to_date_m, bounds);
         self.rods.visit_near(&near, search_m + thickness_m, self.odometer_m, |other| {
+            let lag_m = self.rod_lag_m(rod.max(other));
             if other == rod
-                || are_segments_surely_apart(ends(rod), ends(other), gap_m + thickness_m)
+                || are_segments_surely_apart(ends(rod), ends(other), gap_m + lag_m + thickness_m)
             {
                 return;
             }
             for [one, other] in part_pairs(rod.min(other), rod.max(other), rods) {
                 if !one.is_near_along_chain(other) {
                     let pair_m = chain.own_gap_m(points, [one, other]);
-                    gap_m = gap_m.min(pair_m.unwrap_or(f64::INFINITY));
+                    gap_m = gap_m.min(pair_m.unwrap_or(f64::INFINITY) - lag_m);
                 }
             }
         });
         gap_m
+    }
+
+    /// Returns the distance that a rod may be from where the chain has it, meters.
+    fn rod_lag_m(&self, rod: usize) -> f64 {
+        if rod >= self.first_lagging_rod { self.lag_m } else { 0.0 }
     }
 
     /// Returns whether a block is at least `needed_m` from all blocks that are not beside it along the chain, by their
@@ -337,15 +402,26 @@ impl<const D: usize> SeparationBounds<D> {
         };
         let own = bounds_of(block);
         let bounds = (0..rods.div_ceil(BLOCK)).map(bounds_of);
-        let mut gap_m = search_m;
-        self.blocks.refresh(search_m + thickness_m, self.odometer_m, bounds);
+        // Boxes may be off by that along every axis.
+        let axes = (D as f64).sqrt();
+        let mut gap_m = search_m - axes * self.lag_m;
+        let up_to_date_m = self.odometer_m - 2.0 * self.lag_m;
+        self.blocks.refresh(search_m + thickness_m, up_to_date_m, bounds);
         self.blocks.visit_near(&own, search_m + thickness_m, self.odometer_m, |other| {
             if other.abs_diff(block) > 1 {
-                gap_m = gap_m.min(own.distance_m(&bounds_of(other)) - thickness_m);
+                let last_rod = block_rods(block.max(other), rods).end - 1;
+                let lag_m = axes * self.rod_lag_m(last_rod);
+                gap_m = gap_m.min(own.distance_m(&bounds_of(other)) - thickness_m - lag_m);
             }
         });
         gap_m
     }
+}
+
+/// Returns the gap that two parts must have after a motion in which none moved by more than `travel_m`: on the path both
+/// were up to the travel from where they are at its end, and the test of paths adds it once more.
+fn needed_gap_m(travel_m: f64) -> f64 {
+    3.0 * travel_m + MARGIN_M
 }
 
 fn block_rods(block: usize, rods: usize) -> Range<usize> {

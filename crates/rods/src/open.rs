@@ -34,6 +34,24 @@ pub(super) fn pull_chain_by_connector<const D: usize>(
     }
 }
 
+/// Moves connector 0, and of the first `connectors` all that must follow. The rest of the chain follows later, from
+/// where the last of them goes.
+pub(super) fn pull_first_connectors<const D: usize>(
+    chain: &mut Chain<D>,
+    connectors: usize,
+    to: Point<D>,
+    tally: &mut MotionEffects,
+) {
+    let min_move_m = chain.min_move_m();
+    let (points, rods) = chain.parts_mut();
+    let mut sweep = ObstacleFreePropagation::start(ChainDirection::Up, 0, points[0], to);
+    points[0] = to;
+    while sweep.master + 1 < connectors && sweep.advance::<false>(points, rods, min_move_m) {}
+    tally.record_touched_range(0..sweep.master + 1);
+    tally.changed += 1 + sweep.changed;
+    tally.record_slave_move(sweep.longest2.sqrt());
+}
+
 /// Makes both sweeps. `NEARLY` is a parameter of the type because the loop is too short to test the
 /// rule at every slave.
 #[inline]

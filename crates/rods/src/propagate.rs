@@ -22,7 +22,7 @@ use super::rules::{ReactionRules, RotationRule};
 use super::veto::{
     CompletedMotion, MotionOutcome, MotionRequest, RequestedMotion, Veto, VetoEffect, VetoReason,
 };
-use separation::SeparationProofSchedule;
+pub(super) use separation::SeparationProofSchedule;
 use sidestep_kernel::{InputError, interrupt};
 use std::ops::Range;
 use std::sync::Arc;
@@ -103,6 +103,16 @@ impl<const D: usize> InitiatingConnectors<D> {
     }
 }
 
+/// A sub-step of a request.
+#[derive(Debug, Clone, Copy)]
+struct SubStep<const D: usize> {
+    driven: InitiatingConnectors<D>,
+    /// Whether no later one can make the request take it back.
+    is_last: bool,
+    /// Whether it may come near no part of the chain; otherwise that was found out already.
+    may_be_free: bool,
+}
+
 /// The index of the connector that objects, and its objection.
 type ConnectorVeto = (usize, IncompleteVeto);
 
@@ -153,16 +163,19 @@ impl<const D: usize> Propagator<D> {
             return Ok(MotionOutcome::Vetoed(make_veto(chain, driven.first, by, objection)));
         }
         let n = self.sub_steps(chain, obstacles, &driven, from)?;
-        let may_be_whole = n > 1 && self.reaction.is_none() && self.rules.step_m.is_none();
+        let may_be_whole = self.reaction.is_none() && self.rules.step_m.is_none();
         if may_be_whole && self.try_whole_motion(chain, obstacles, &driven) {
             return Ok(MotionOutcome::Moved(self.completed_motion(None)));
         }
+        // The proof of a motion of one sub-step is the same as that of the whole.
+        let may_be_free = n > 1 || !may_be_whole;
         for k in 1..=n {
             if k.is_multiple_of(INTERRUPT_CHECK_INTERVAL) {
                 interrupt::check();
             }
             let driven = InitiatingConnectors { to: driven.positions_at(from, [k, n]), ..driven };
-            if let Err((by, objection)) = self.sub_step(chain, obstacles, driven, k == n) {
+            let step = SubStep { driven, is_last: k == n, may_be_free };
+            if let Err((by, objection)) = self.sub_step(chain, obstacles, step) {
                 let veto = make_veto(chain, driven.first, by, objection);
                 return Ok(self.end_at_veto(chain, request.mode, veto));
             }
@@ -233,15 +246,14 @@ impl<const D: usize> Propagator<D> {
         CompletedMotion { touched: from..to, changed, rotated, max_slave_step_m, cut_short }
     }
 
-    /// Makes one sub-step: all of it, or nothing. `is_last` says that no later one can make the request
-    /// take it back.
+    /// Makes one sub-step: all of it, or nothing.
     fn sub_step(
         &mut self,
         chain: &mut Chain<D>,
         obstacles: &Obstacles<D>,
-        driven: InitiatingConnectors<D>,
-        is_last: bool,
+        step: SubStep<D>,
     ) -> Result<(), ConnectorVeto> {
+        let SubStep { driven, is_last, may_be_free } = step;
         if has_arrived(chain, &driven) {
             return Ok(());
         }
@@ -260,7 +272,7 @@ impl<const D: usize> Propagator<D> {
             );
             return Ok(());
         }
-        if is_open && self.try_collision_free_pull(chain, &driven, is_last) {
+        if is_open && may_be_free && self.try_collision_free_pull(chain, &driven, is_last) {
             return Ok(());
         }
         if self.rules.self_collision {

@@ -57,7 +57,7 @@ pub fn pull_first<const D: usize>(
     let mut propagator = Propagator::new(ReactionRules::default());
     for group in heads.chunks(LANES) {
         if group.len() >= MIN_MOTIONS {
-            pull_lanes::<D, false>(chain, group);
+            pull_lanes::<D, false>(chain, 0, group);
             continue;
         }
         for head in group {
@@ -85,13 +85,16 @@ pub struct MotionBatchMeasures {
 /// Motions of connector 0 of a plain chain that the other connectors have yet to follow.
 ///
 /// Where nothing can object, the motion of a chain follows from that of its initiator, so it does not matter when
-/// it moves: to follow several motions at once gives the same bits, and is much faster. Until then only
-/// connector 0 of the chain is where it should be.
+/// it moves: to follow several motions at once gives the same bits, and is much faster. Until then only the connectors up
+/// to the head are where they should be: connector 0 alone, or those of a chain with a solid body that could object
+/// ([`DeferredSolidMotions`](super::DeferredSolidMotions)).
 #[derive(Debug, Clone, Default)]
 pub struct DeferredMotions<const D: usize> {
-    /// Position of connector 0 before the first deferred motion.
+    /// The connector that the rest of the chain follows.
+    head: usize,
+    /// Its position before the first deferred motion.
     start: Option<Point<D>>,
-    /// Positions of connector 0 after each of them.
+    /// Its positions after each of them.
     heads: Vec<Point<D>>,
 }
 
@@ -99,6 +102,11 @@ impl<const D: usize> DeferredMotions<D> {
     /// Returns whether no motion is deferred: all connectors are where they should be.
     pub fn is_empty(&self) -> bool {
         self.heads.is_empty()
+    }
+
+    /// Returns the number of deferred motions.
+    pub(super) fn len(&self) -> usize {
+        self.heads.len()
     }
 
     /// Returns whether as many motions are deferred as are made at once: then the chain is to follow.
@@ -111,17 +119,27 @@ impl<const D: usize> DeferredMotions<D> {
     /// # Panics
     /// If [`Self::is_full`].
     pub fn move_first(&mut self, chain: &mut Chain<D>, to: Point<D>) {
-        assert!(!self.is_full(), "the chain has to follow first");
-        let head = &mut chain.points_mut()[0];
-        self.start.get_or_insert(*head);
-        self.heads.push(to);
-        *head = to;
+        let was = std::mem::replace(&mut chain.points_mut()[0], to);
+        self.defer_rest(0, [was, to]);
     }
 
-    /// Lets the other connectors follow all deferred motions; returns their measures, if there were any.
+    /// Defers what follows connector `head`, which has moved from the first position to the second.
+    ///
+    /// # Panics
+    /// If [`Self::is_full`], or if motions of another head are deferred.
+    pub(super) fn defer_rest(&mut self, head: usize, [was, now]: [Point<D>; 2]) {
+        assert!(!self.is_full(), "the chain has to follow first");
+        assert!(self.is_empty() || self.head == head, "the chain has to follow first");
+        self.head = head;
+        self.start.get_or_insert(was);
+        self.heads.push(now);
+    }
+
+    /// Lets the connectors beyond the head follow all deferred motions; returns their measures, with those of the head, if
+    /// there were any.
     pub fn apply_to_chain(&mut self, chain: &mut Chain<D>) -> Option<MotionBatchMeasures> {
-        chain.points_mut()[0] = self.start.take()?;
-        let measures = pull_lanes::<D, true>(chain, &self.heads);
+        chain.points_mut()[self.head] = self.start.take()?;
+        let measures = pull_lanes::<D, true>(chain, self.head, &self.heads);
         self.heads.clear();
         Some(measures)
     }
@@ -201,11 +219,11 @@ struct LaneMotions<const D: usize, const MEASURES: bool> {
 }
 
 impl<const D: usize, const MEASURES: bool> LaneMotions<D, MEASURES> {
-    fn new(chain: &Chain<D>, n: usize) -> Self {
+    fn new(chain: &Chain<D>, first: usize, n: usize) -> Self {
         let sure_move_m = chain.min_move_m().max(ROUNDING_LENGTH_M);
         Self {
             n,
-            connectors: chain.points().len(),
+            connectors: chain.points().len() - first,
             limits: LaneRodLimits { min_m: [1.0; LANES], max_m: [1.0; LANES], equal_rods: LANES },
             min_move_m: chain.min_move_m(),
             sure_move_m: std::array::from_fn(|w| if w < n { sure_move_m } else { -1.0 }),
@@ -348,15 +366,18 @@ fn beyond_last<const D: usize>(j: usize) -> Point<D> {
     super::geometry::scaled(super::geometry::unit_x(), 4.0 * j as f64)
 }
 
-/// Makes as many motions as there are heads, at most one per lane. Lanes without a head, not yet at
-/// a connector, or past the last one hold values that are never read.
+/// Makes as many motions of connector `first` as there are heads, at most one per lane; those beyond it follow. Lanes
+/// without a head, not yet at a connector, or past the last one hold values that are never read.
 fn pull_lanes<const D: usize, const MEASURES: bool>(
     chain: &mut Chain<D>,
+    first: usize,
     heads: &[Point<D>],
 ) -> MotionBatchMeasures {
     let n = heads.len();
-    let mut motions = LaneMotions::<D, MEASURES>::new(chain, n);
+    let mut motions = LaneMotions::<D, MEASURES>::new(chain, first, n);
     let (points, rods) = chain.parts_mut();
+    let points = &mut points[first..];
+    let rods = &rods[first..];
     let unused = Rod { min_m: 1.0, max_m: 1.0, radius_m: 0.0 };
     let mut now = SimdLanePositions::far_apart();
     let mut next = SimdLanePositions::far_apart();
@@ -430,7 +451,7 @@ mod tests {
                 expected.max_rod_violation_m =
                     expected.max_rod_violation_m.max(single.max_rod_violation_m());
             }
-            let measured = pull_lanes::<D, true>(&mut at_once, group);
+            let measured = pull_lanes::<D, true>(&mut at_once, 0, group);
             assert_eq!(at_once.points(), single.points());
             assert_eq!(measured.changed, expected.changed);
             assert_eq!(measured.longest_m.to_bits(), expected.longest_m.to_bits());

@@ -64,7 +64,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
 
     /// Returns a posture whose rods all have one direction, from a place of the root; behind the root they go on.
     pub(super) fn straight_posture(&self, root_at: Point<D>, u: Point<D>) -> ChainPosture<D> {
-        self.bent_posture(root_at, [u, perpendicular(u)], 0.0)
+        self.bend_posture(root_at, [u, perpendicular(u)], 0.0)
     }
 
     /// Returns the direction of the first rod of a posture toward the initiator.
@@ -121,12 +121,12 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         across: Point<D>,
     ) -> Option<ChainPosture<D>> {
         let arc = Arc::between([root_at, target], across, &self.rods_to_initiator())?;
-        Some(self.bent_posture(root_at, arc.axes, arc.bend_rad))
+        Some(self.bend_posture(root_at, arc.axes, arc.bend_rad))
     }
 
     /// Returns a posture whose rods from the root to the initiator bend by the same angle at each connector, from the
     /// first direction toward the second; all other rods go straight on.
-    fn bent_posture(
+    fn bend_posture(
         &self,
         root_at: Point<D>,
         [first, second]: [Point<D>; 2],

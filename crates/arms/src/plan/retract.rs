@@ -31,7 +31,7 @@ pub(super) fn find_simple_path<const D: usize>(
     let present = space.present_posture();
     let simple = trail.last().unwrap_or(&present);
     if space.far_end().is_some()
-        && let Some(led) = space.led_postures(simple, target)
+        && let Some(led) = space.lead_postures(simple, target)
     {
         return Some([trail, &led].concat());
     }
@@ -88,7 +88,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         let shares = (0..UNBEND_STEPS).rev().map(|step| step as f64 / UNBEND_STEPS as f64);
         let mut path: Vec<ChainPosture<D>> = Vec::new();
         for share in shares {
-            let next = self.unbent_posture(from, share);
+            let next = self.unbend_posture(from, share);
             if !self.is_path_free(path.last().unwrap_or(from), &next) {
                 return None;
             }
@@ -128,7 +128,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
     }
 
     /// Returns a posture with only a share of each of its bends, about the same root and first rods.
-    fn unbent_posture(&self, from: &ChainPosture<D>, share: f64) -> ChainPosture<D> {
+    fn unbend_posture(&self, from: &ChainPosture<D>, share: f64) -> ChainPosture<D> {
         let mut posture = from.clone();
         for limb in self.limbs() {
             let direction =

@@ -177,7 +177,7 @@ impl<'a, const D: usize> ChainConfigurationSpace<'a, D> {
 
     /// Returns a posture near one in which rods have allowed lengths and the chain's own parts are apart, if there is one.
     /// Connector `pinned` stays.
-    pub(super) fn settled_posture(
+    pub(super) fn settle_posture(
         &self,
         mut posture: ChainPosture<D>,
         pinned: Option<usize>,

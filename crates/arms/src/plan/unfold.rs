@@ -57,7 +57,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
             let mut moved = None;
             while moved.is_none() && step_m >= MIN_STEP_FRACTION * rod_m {
                 moved = self
-                    .pushed_posture(&at, &forces, step_m)
+                    .push_posture(&at, &forces, step_m)
                     .filter(|next| self.repulsion(next).0 < energy && self.is_path_free(&at, next));
                 if moved.is_none() {
                     step_m *= 0.5;
@@ -131,7 +131,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
     }
 
     /// Returns the posture after a step in which no connector moves farther than `step_m`, if there is one.
-    fn pushed_posture(
+    fn push_posture(
         &self,
         at: &ChainPosture<D>,
         forces: &[Point<D>],
@@ -200,12 +200,12 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
         for k in inner {
             posture[k] = add_scaled(posture[k], forces[k], step_m / strongest);
         }
-        self.settled_posture(posture, None)
+        self.settle_posture(posture, None)
     }
 
     /// Returns postures of a chain between two ends on the way of its initiator straight to a place, each with a free straight
     /// path from the one before, while all other parts keep away from each other; none if it does not get there.
-    pub(super) fn led_postures(
+    pub(super) fn lead_postures(
         &self,
         from: &ChainPosture<D>,
         place: Point<D>,
@@ -222,7 +222,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
                 return Some(postures);
             }
             let (_, forces) = self.repulsion(&at);
-            let next = self.led_posture(&at, &forces, move_toward(at[k], place, step_m));
+            let next = self.lead_posture(&at, &forces, move_toward(at[k], place, step_m));
             match next.filter(|next| self.is_path_free(&at, next)) {
                 Some(next) => {
                     step_m = (STEP_GROWTH * step_m).min(longest_m);
@@ -239,7 +239,7 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
     }
 
     /// Returns the posture with the initiator at a place, and all others pushed apart by as much.
-    fn led_posture(
+    fn lead_posture(
         &self,
         at: &ChainPosture<D>,
         forces: &[Point<D>],
@@ -254,6 +254,6 @@ impl<const D: usize> ChainConfigurationSpace<'_, D> {
             posture[i] = add_scaled(posture[i], forces[i], scale);
         }
         posture[k] = place;
-        self.settled_posture(posture, Some(k))
+        self.settle_posture(posture, Some(k))
     }
 }

@@ -5,7 +5,7 @@
 //! the proof fails, the motion is taken back and made with all tests. A sub-step has the same bits either way. A whole
 //! request that is proven is one step instead of several, whatever the worker did before.
 
-use super::{InitiatingConnectors, MotionEffects, Propagator, can_only_self_collide};
+use super::{InitiatingConnectors, MotionEffects, Propagator, can_only_self_collide, has_arrived};
 use crate::chain::Chain;
 use crate::geometry::distance;
 use crate::motion_bounds::ProvenMotion;
@@ -16,7 +16,7 @@ use std::ops::Range;
 /// The schedule of proofs: exponential backoff. The effort of a proof that fails is lost, so every
 /// failure doubles the number of motions until the next attempt. No result depends on it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct SeparationProofSchedule {
+pub(crate) struct SeparationProofSchedule {
     until_next: u32,
     pause: u32,
 }
@@ -28,7 +28,7 @@ const MAX_PAUSE: u32 = 256;
 impl SeparationProofSchedule {
     /// Returns whether a proof is due for this motion, and counts the motion.
     #[inline]
-    fn is_due(&mut self) -> bool {
+    pub(crate) fn is_due(&mut self) -> bool {
         let is_due = self.until_next == 0;
         self.until_next = self.until_next.saturating_sub(1);
         is_due
@@ -37,7 +37,7 @@ impl SeparationProofSchedule {
     /// A proof that holds is followed by another at once, one that fails by a longer pause than
     /// before.
     #[inline]
-    fn record(&mut self, holds: bool) {
+    pub(crate) fn record(&mut self, holds: bool) {
         self.pause = if holds { 0 } else { (2 * self.pause).clamp(1, MAX_PAUSE) };
         self.until_next = self.pause;
     }
@@ -72,7 +72,7 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Makes all of a request in one motion, as in the open, if no part comes near another in it: one long step is then
-    /// as safe as many short ones. Whether it does follows from the chain and the request alone. Returns whether it was
+    /// as safe as many short ones, and has the bits that it has without an own body. Whether it does follows from the chain and the request alone. Returns whether it was
     /// made.
     pub(super) fn try_whole_motion(
         &mut self,
@@ -80,7 +80,10 @@ impl<const D: usize> Propagator<D> {
         obstacles: &Obstacles<D>,
         driven: &InitiatingConnectors<D>,
     ) -> bool {
-        if !self.rules.self_collision || !can_only_self_collide(chain, obstacles, driven) {
+        let may_prove = self.rules.self_collision
+            && can_only_self_collide(chain, obstacles, driven)
+            && !has_arrived(chain, driven);
+        if !may_prove {
             return false;
         }
         let tally = self.pull_and_prove(chain, driven, StayRule::Exactly);

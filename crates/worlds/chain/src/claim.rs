@@ -24,7 +24,7 @@ pub(crate) fn claim_box_and_decide<const D: usize>(
 pub(crate) fn claim_box<const D: usize>(phase: &mut PhaseContext<'_, ChainWorld<D>>, slot: usize) {
     let &mut PhaseContext { world, state, now, .. } = phase;
     // A chain alone is in no other's way, wherever it goes; and to read it would make a copy of it.
-    if !world.is_collision_impossible() {
+    if !world.has_lone_chain() {
         state.set_claim(slot, cycle_reach_box(world, &world.chains[slot], &state.body(slot), now));
     }
 }

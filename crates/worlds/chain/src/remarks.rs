@@ -1,6 +1,6 @@
 //! Remarks on a valid scenario: effects that will surprise its author. `sidestep check` shows them.
 
-mod unreached;
+mod no_posture;
 
 use super::scenario::ChainScenario;
 use super::scenario::own_overlap_text;
@@ -28,13 +28,13 @@ pub(super) fn remarks<const D: usize>(compiled: &ChainScenario<D>) -> Vec<Remark
     let overlaps = chains.clone().filter_map(|(k, spec)| exempt_overlaps_remark(k, spec));
     // Otherwise all links may touch.
     let overlaps = overlaps.filter(|_| compiled.world.rules.self_collision);
-    let unreached = chains
+    let without_posture = chains
         .clone()
-        .flat_map(|(k, spec)| unreached::unreached_targets_remarks(&compiled.world, k, spec));
+        .flat_map(|(k, spec)| no_posture::no_posture_remarks(&compiled.world, k, spec));
     let of_arms = unlimited.chain(led_slowly).chain(overlaps);
     of_files
         .chain(of_arms)
-        .chain(unreached)
+        .chain(without_posture)
         .chain(slow)
         .chain(own_overlap)
         .chain(unused_rules(compiled))

@@ -232,10 +232,9 @@ impl<const D: usize> ChainWorld<D> {
         self.chains.iter().any(|spec| spec.robots.is_some())
     }
 
-    /// Returns whether nothing is in the way of the only chain, not even the chain itself.
-    pub(crate) fn is_collision_impossible(&self) -> bool {
-        let is_empty = self.obstacles.is_empty() && self.movers.is_empty();
-        is_empty && self.chains.len() == 1 && !self.rules.self_collision
+    /// Returns whether a chain is alone, so that it can collide with nothing but itself.
+    pub(crate) fn has_lone_chain(&self) -> bool {
+        self.obstacles.is_empty() && self.movers.is_empty() && self.chains.len() == 1
     }
 
     /// Returns the seconds from the start of the run to the start of a cycle.

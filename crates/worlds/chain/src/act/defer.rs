@@ -1,8 +1,11 @@
 //! Motions to which nothing can object: the rest of the chain follows later, several at once.
 
+use super::measure::is_own_gap_due;
 use super::situation::goal_distance_m;
 use super::{ChainContext, Initiator};
+use crate::deferred::InitiatorMotion;
 use crate::driver::{Task, TaskKind};
+use crate::metrics::PENETRATION_THRESHOLD_M;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::state::ChainBodyState;
 use sidestep_rods::geometry::{Point, distance};
@@ -16,9 +19,10 @@ pub(super) fn may_defer<const D: usize>(
 ) -> bool {
     let world = context.world;
     let Some(task) = context.task(body) else { return false };
-    // Nothing can veto, a motion is a single sub-step of connector 0, and nothing else needs the
+    // Nothing can veto but the chain itself, a motion is a single sub-step of connector 0, and nothing else needs the
     // others' places.
-    world.is_collision_impossible()
+    world.has_lone_chain()
+        && (!world.rules.self_collision || may_defer_solid_body(context, body))
         && world.reaction.is_none()
         && world.rules.step_m.is_none()
         && context.spec.robots.is_none()
@@ -27,6 +31,17 @@ pub(super) fn may_defer<const D: usize>(
         && body.tally.steps > 0
         && !body.driving.ladder.is_pulling_back()
         && is_task_deferrable(task, &body.chain, world.dt_s)
+}
+
+/// Returns whether nothing reads the places of a chain with a solid body in this cycle.
+fn may_defer_solid_body<const D: usize>(
+    context: ChainContext<'_, D>,
+    body: &ChainBodyState<D>,
+) -> bool {
+    let is_overlap_counted = body.tally.own_depth_m > PENETRATION_THRESHOLD_M;
+    body.plan.is_none()
+        && !is_overlap_counted
+        && !is_own_gap_due(context.now, body.chain.rods().len())
 }
 
 /// Returns whether a task moves connector 0, and cannot leave the range of coordinates in a cycle.
@@ -39,23 +54,25 @@ fn is_task_deferrable<const D: usize>(task: &Task<D>, chain: &Chain<D>, dt_s: f6
         && chain.points()[0].iter().all(|x| x.abs() < most_m)
 }
 
-/// Moves connector 0; the others follow when [`ChainBodyState::apply_deferred_motions`] is called.
+/// Moves connector 0; the others follow when [`ChainBodyState::apply_deferred_motions`] is called. None if something may
+/// object: then nothing has moved.
 pub(super) fn move_initiator_only<const D: usize>(
     initiator: Initiator<'_, D>,
     body: &mut ChainBodyState<D>,
     to: Point<D>,
-) -> RecoveryOutcome<D> {
+) -> Option<RecoveryOutcome<D>> {
     let world = initiator.context.world;
     let goal_m = goal_distance_m(initiator.task, body);
-    body.driving.ladder.record_free_motion(initiator.task.request_source(), goal_m, &world.rungs);
     let step_m = distance(body.chain.points()[0], to);
     if step_m > body.chain.min_move_m() {
         let dt_s = world.dt_s;
-        body.tally.max_speed_m_s = body.tally.max_speed_m_s.max(step_m / dt_s);
-        if body.deferred.move_initiator(&mut body.chain, to, dt_s) {
-            body.apply_deferred_motions();
+        let motion = InitiatorMotion { to, rules: &world.rules, dt_s };
+        if !body.deferred.move_initiator(&mut body.chain, motion, &mut body.tally) {
+            return None;
         }
+        body.tally.max_speed_m_s = body.tally.max_speed_m_s.max(step_m / dt_s);
     }
+    body.driving.ladder.record_free_motion(initiator.task.request_source(), goal_m, &world.rungs);
     // What the chain moves is counted when it follows.
     let nothing = CompletedMotion {
         touched: 0..0,
@@ -64,5 +81,5 @@ pub(super) fn move_initiator_only<const D: usize>(
         max_slave_step_m: 0.0,
         cut_short: None,
     };
-    RecoveryOutcome::Straight(nothing)
+    Some(RecoveryOutcome::Straight(nothing))
 }

@@ -32,7 +32,7 @@ pub(super) fn run_task_cycle<const D: usize>(
 ) -> TaskCycleOutcome<D> {
     let mut outcome = TaskCycleOutcome { step: None, gives_way: lead_context.is_pressed };
     let Some(task) = context.task(acting.body) else { return outcome };
-    let initiator = Initiator { context, task, follows: lead_context.follows };
+    let initiator = Initiator { context, task };
     // Whether this cycle uses up the time of the task.
     let is_late = context.world.cycle_start_time_s(acting.body.driving.cycles + 1) >= task.lasts_s;
     acting.body.driving.cycles += 1;

@@ -14,8 +14,14 @@ pub(super) fn move_initiator<const D: usize>(
     to: Point<D>,
 ) -> MoveOutcome {
     let at = initiator.position(acting.body);
-    let climbed = match initiator.follows {
-        ChainFollowMode::Deferred => Some(defer::move_initiator_only(initiator, acting.body, to)),
+    let climbed = match acting.follows {
+        ChainFollowMode::Deferred => {
+            let deferred = defer::move_initiator_only(initiator, acting.body, to);
+            Some(deferred.unwrap_or_else(|| {
+                acting.follow_at_once();
+                request_motion(initiator, acting, to)
+            }))
+        }
         ChainFollowMode::AsTeam => negotiation::negotiate_move(initiator, acting, to),
         ChainFollowMode::AtOnce => Some(request_motion(initiator, acting, to)),
     };

@@ -5,6 +5,7 @@ use super::{ChainContext, ChainCycleState};
 use crate::clearance::min_clearance;
 use crate::events::EventKind;
 use crate::metrics::PENETRATION_THRESHOLD_M;
+use sidestep_kernel::Cycle;
 use sidestep_rods::geometry::distance;
 use sidestep_rods::{RodBvh, nearest_own_parts};
 
@@ -16,6 +17,13 @@ const MAX_MEASURED_RODS: usize = 32;
 const MEASURE_INTERVAL_CYCLES: u64 = 16;
 /// The rods for which that is the interval.
 const RODS_PER_INTERVAL: usize = 1024;
+
+/// Returns whether the gap of a chain to itself is measured in a cycle. Parts that cross stay crossed for many cycles, so
+/// rare measurements of a long chain find them, too.
+pub(super) fn is_own_gap_due(now: Cycle, rods: usize) -> bool {
+    let interval = MEASURE_INTERVAL_CYCLES * rods.div_ceil(RODS_PER_INTERVAL) as u64;
+    rods <= MAX_MEASURED_RODS || now.is_multiple_of(interval)
+}
 
 /// Measures a chain after its cycle; `robots_gap_m` is the least gap around its robots.
 pub(super) fn measure_chain<const D: usize>(
@@ -39,10 +47,7 @@ pub(super) fn measure_chain<const D: usize>(
         tally.max_rod_violation_m = tally.max_rod_violation_m.max(chain.max_rod_violation_m());
     }
     let mut own_part = None;
-    // Parts that cross stay crossed for many cycles, so rare measurements of a long chain find them, too.
-    let rods = chain.rods().len();
-    let interval = MEASURE_INTERVAL_CYCLES * rods.div_ceil(RODS_PER_INTERVAL) as u64;
-    let is_due = rods <= MAX_MEASURED_RODS || now.is_multiple_of(interval);
+    let is_due = is_own_gap_due(now, chain.rods().len());
     if is_whole && is_due && world.rules.self_collision {
         match &arm {
             Some(arm) => tally.add_own_gap(arm.own_m),

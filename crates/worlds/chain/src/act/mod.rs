@@ -78,7 +78,6 @@ struct ChainContext<'a, const D: usize> {
 struct Initiator<'a, const D: usize> {
     context: ChainContext<'a, D>,
     task: &'a Task<D>,
-    follows: ChainFollowMode,
 }
 
 /// How the rest of a chain follows its initiator.
@@ -95,10 +94,12 @@ enum ChainFollowMode {
 /// A chain as it acts: what its cycle changes.
 struct ChainCycleState<'a, const D: usize> {
     body: &'a mut ChainBodyState<D>,
-    /// Its positions before the cycle; of an arm those of its reference.
-    before: &'a PositionBuffer<D>,
+    follows: ChainFollowMode,
+    /// Its positions before the cycle; of an arm those of its reference. Of a chain that follows later they are not
+    /// recorded.
+    before: &'a mut PositionBuffer<D>,
     /// Where an arm was before the cycle; of other chains the same positions.
-    actual: &'a PositionBuffer<D>,
+    actual: &'a mut PositionBuffer<D>,
     propagator: &'a mut Propagator<D>,
     negotiation: Negotiation<'a, D>,
     sink: EventSink<'a, D>,
@@ -165,23 +166,27 @@ fn run_cycle<const D: usize>(
     }
     let mut escaping =
         EscapeContext { escaper: scratch.escaper.as_mut(), escaped: &mut scratch.escaped, claim };
-    let before = &scratch.before;
-    let actual = &scratch.actual;
+    let before = &mut scratch.before;
+    let actual = &mut scratch.actual;
     let propagator = &mut scratch.propagator;
     let negotiation = Negotiation::new(scratch.percept_log.as_mut());
-    let mut acting = ChainCycleState { body, before, actual, propagator, negotiation, sink };
+    let mut acting =
+        ChainCycleState { body, follows, before, actual, propagator, negotiation, sink };
     if follows == ChainFollowMode::Deferred {
-        let lead_context =
-            InitiatorContext { inputs, follows, escaping: &escaping, is_pressed: false };
+        let lead_context = InitiatorContext { inputs, escaping: &escaping, is_pressed: false };
         drive::run_task_cycle(context, &mut acting, &lead_context);
-        // Its measures are taken when the chain follows: no obstacle is there to measure a distance to.
-        acting.body.tally.steps += 1;
+        if acting.follows == ChainFollowMode::Deferred {
+            // Its measures are taken when the chain follows: no obstacle is there to measure a distance to.
+            acting.body.tally.steps += 1;
+        } else {
+            measure::measure_chain(context, &mut acting, &mut scratch.own_rods, f64::INFINITY);
+        }
         return;
     }
     if acting.body.scattered.is_some() {
         gather::gather_parts(context, &mut acting, claim);
     } else {
-        act_whole_chain(context, &mut acting, &mut escaping, inputs, follows);
+        act_whole_chain(context, &mut acting, &mut escaping, inputs);
     }
     joint_motion::finish_cycle(context, acting.body, joints);
     let solid = scratch.nearby.obstacles_solid_to_robots();
@@ -197,12 +202,11 @@ fn act_whole_chain<const D: usize>(
     acting: &mut ChainCycleState<'_, D>,
     escaping: &mut EscapeContext<'_, D>,
     inputs: CycleInputs,
-    follows: ChainFollowMode,
 ) {
     let is_pressed = escaping.escape(context, acting);
-    let lead_context = InitiatorContext { inputs, follows, escaping, is_pressed };
+    let lead_context = InitiatorContext { inputs, escaping, is_pressed };
     let outcome = drive::run_task_cycle(context, acting, &lead_context);
-    if follows == ChainFollowMode::AsTeam {
+    if acting.follows == ChainFollowMode::AsTeam {
         negotiation::negotiate_without_motion(context, acting);
     }
     let veto = escaping.enforce_claim(context, acting.body, acting.before);
@@ -254,6 +258,17 @@ impl ChainFollowMode {
 }
 
 impl<const D: usize> ChainCycleState<'_, D> {
+    /// Lets a chain follow its initiator at once where it was to follow later, before anything moves in this cycle.
+    fn follow_at_once(&mut self) {
+        if self.follows != ChainFollowMode::Deferred {
+            return;
+        }
+        self.follows = ChainFollowMode::AtOnce;
+        self.body.apply_deferred_motions();
+        self.actual.record(self.body);
+        self.before.record(self.body);
+    }
+
     /// Counts a veto; of several in a row by one connector for one reason only the first is an
     /// event, because a chain that is blocked meets the same veto in every cycle.
     fn record_veto(&mut self, veto: &Veto<D>) {

@@ -54,6 +54,9 @@ pub(super) fn plan_if_stuck<const D: usize>(
     if body.plan.is_some() || !is_in_own_way && !is_plan_due(initiator, body.driving.late) {
         return;
     }
+    // The search needs the places of all connectors.
+    acting.follow_at_once();
+    let body = &mut *acting.body;
     // Half of the tolerance, so that the end of the path counts as the target though it is followed with rounding.
     let query = PlanningQuery { k, target, tolerance_m: 0.5 * targets.tolerance_m };
     // A chain that is held on both sides otherwise than by fixed ends, or a target out of range, has no plan.

@@ -10,7 +10,7 @@ use super::own_driver::ask_own_driver;
 use super::plan::plan_if_stuck;
 use super::tasks::{complete_target, is_last_target};
 use super::wheels::NavigatedChain;
-use super::{ChainCycleState, ChainFollowMode, Initiator};
+use super::{ChainCycleState, Initiator};
 use crate::driver::external::Orders;
 use crate::driver::own_driver::DriverAction;
 use crate::driver::{Targets, TaskKind, Wander, wander_direction};
@@ -40,7 +40,6 @@ pub(super) struct CycleInputs {
 #[derive(Clone, Copy)]
 pub(super) struct InitiatorContext<'a, const D: usize> {
     pub(super) inputs: CycleInputs,
-    pub(super) follows: ChainFollowMode,
     pub(super) escaping: &'a EscapeContext<'a, D>,
     /// Whether it waits, because parts of the chain escape from an obstacle.
     pub(super) is_pressed: bool,

@@ -7,7 +7,7 @@
 
 use super::super::ObstacleEscapeRules;
 use super::TOUCH_M;
-use super::endangered::{EndangeredConnector, endangered_connectors, group_to_save};
+use super::at_risk::{ConnectorAtRisk, connectors_at_risk, group_to_save};
 use super::exit_search::ExitSearch;
 use super::posture::ends;
 use super::rollout::Rollout;
@@ -125,9 +125,9 @@ impl EscapePlan {
         }
         self.pause = CHOICE_INTERVAL_TICKS;
         let now = self.exit_direction();
-        let endangered = endangered_connectors(input, solver);
-        let group = group_to_save(&endangered, now.map(|exit| exit.obstacle));
-        let around = rolled_out_connectors(group, input.chain.points().len());
+        let at_risk = connectors_at_risk(input, solver);
+        let group = group_to_save(&at_risk, now.map(|exit| exit.obstacle));
+        let around = roll_out_connectors(group, input.chain.points().len());
         let Some(rollout) = Rollout::from_connector_range(rules, input, around) else {
             return false;
         };
@@ -147,11 +147,11 @@ impl EscapePlan {
 /// Returns the exits through the obstacles near a group of connectors.
 fn exit_candidates<const D: usize>(
     input: &EscapeSolveInput<'_, D>,
-    group: &[EndangeredConnector],
+    group: &[ConnectorAtRisk],
 ) -> Vec<ExitDirection<D>> {
     let mut exits = Vec::new();
     for mover in input.obstacles.moving() {
-        let near = group.iter().filter(|endangered| endangered.obstacle == mover.id);
+        let near = group.iter().filter(|at_risk| at_risk.obstacle == mover.id);
         let Some(nearest) = near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)) else { continue };
         let nearest = mover.core.nearest_to_segment(ends(input.chain.points(), nearest.part));
         let through = scaled(direction_away(mover, &nearest), -1.0);
@@ -192,13 +192,10 @@ fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) ->
 }
 
 /// Returns the connectors that rollouts include to save some: also those to either side.
-fn rolled_out_connectors(
-    group: &[EndangeredConnector],
-    connectors: usize,
-) -> RangeInclusive<usize> {
+fn roll_out_connectors(group: &[ConnectorAtRisk], connectors: usize) -> RangeInclusive<usize> {
     // Without any in danger the chain's start stands for it.
-    let from = group.first().map_or(0, |endangered| endangered.k);
-    let to = group.last().map_or(0, |endangered| endangered.k);
+    let from = group.first().map_or(0, |at_risk| at_risk.k);
+    let to = group.last().map_or(0, |at_risk| at_risk.k);
     from.saturating_sub(SIDE_CONNECTORS)..=(to + 1 + SIDE_CONNECTORS).min(connectors - 1)
 }
 

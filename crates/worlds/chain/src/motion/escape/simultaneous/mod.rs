@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! solve.rs          new positions of all parts: contacts.rs, lengths.rs, odometer.rs, and the hard constraints.rs
-//! escape_plan.rs    exits for parts that are caught (endangered.rs), of which exit_search.rs finds the shortest
+//! escape_plan.rs    exits for parts that are caught (at_risk.rs), of which exit_search.rs finds the shortest
 //! work.rs           the work that rollouts may take
 //! leader_choice.rs  the leader's choice before any part is caught: rollouts of its motion and of resting
 //! rollout.rs        copies of a part of the chain on which motions are tried
@@ -14,9 +14,9 @@
 //! distance that they travel in the look-ahead. If a part is caught all the same, because obstacles close like tongs
 //! or the chain is taut, it leaves through one of them, by the exit that rollouts find shortest.
 
+mod at_risk;
 mod constraints;
 mod contacts;
-mod endangered;
 mod escape_plan;
 mod exit_search;
 mod leader_choice;

@@ -5,9 +5,9 @@ use super::solve::EscapeSolver;
 use super::solve_input::EscapeSolveInput;
 use sidestep_rods::ChainPart;
 
-/// Gap below which a connector or the rod at it counts as endangered, meters: twice as far as danger begins, because an
+/// Gap below which a connector or the rod at it counts as at risk, meters: twice as far as danger begins, because an
 /// obstacle that is not in contact yet may be the better exit.
-const ENDANGERED_DISTANCE_M: f64 = 0.24;
+const RISK_DISTANCE_M: f64 = 0.24;
 /// Connectors between two groups at least: as many as rollouts include on both sides of one.
 const GROUP_DISTANCE: usize = 24;
 /// Connectors up to which groups are rolled out together, and a long group as a whole.
@@ -15,7 +15,7 @@ const MAX_CONNECTORS: usize = 100;
 
 /// A connector near an obstacle, itself or by the rod behind it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct EndangeredConnector {
+pub(super) struct ConnectorAtRisk {
     pub(super) k: usize,
     /// The part that is near: the connector, or the rod.
     pub(super) part: ChainPart,
@@ -24,53 +24,45 @@ pub(super) struct EndangeredConnector {
     pub(super) gap_m: f64,
 }
 
-/// Returns the endangered connectors in the order of the chain.
-pub(super) fn endangered_connectors<const D: usize>(
+/// Returns the connectors at risk in the order of the chain.
+pub(super) fn connectors_at_risk<const D: usize>(
     input: &EscapeSolveInput<'_, D>,
     solver: &EscapeSolver<D>,
-) -> Vec<EndangeredConnector> {
-    let mut endangered = Vec::new();
+) -> Vec<ConnectorAtRisk> {
+    let mut at_risk = Vec::new();
     for threat in &solver.contacts.threats {
         let mover = &input.obstacles.moving()[threat.mover];
         let gap_m = gap_m(input.chain, threat.part, mover);
-        if gap_m < ENDANGERED_DISTANCE_M {
+        if gap_m < RISK_DISTANCE_M {
             let k = threat.part.connector();
-            endangered.push(EndangeredConnector {
-                k,
-                part: threat.part,
-                obstacle: mover.id,
-                gap_m,
-            });
+            at_risk.push(ConnectorAtRisk { k, part: threat.part, obstacle: mover.id, gap_m });
         }
     }
-    endangered.sort_by_key(|endangered| (endangered.k, endangered.obstacle));
-    endangered
+    at_risk.sort_by_key(|at_risk| (at_risk.k, at_risk.obstacle));
+    at_risk
 }
 
 /// Returns the connectors that rollouts are to save. It is the group of the one that is nearest to an obstacle, because
 /// rollouts take time with each connector. A chain that is leaving through another obstacle, whose id is given, must not
 /// give that up for it: then all groups are, or if these are far apart the one at that obstacle.
-pub(super) fn group_to_save(
-    endangered: &[EndangeredConnector],
-    exit: Option<u32>,
-) -> &[EndangeredConnector] {
-    let are_near = |a: &EndangeredConnector, b: &EndangeredConnector| b.k - a.k <= GROUP_DISTANCE;
-    let groups = || endangered.chunk_by(are_near);
-    let least_gap_m = |group: &[EndangeredConnector]| {
-        group.iter().map(|endangered| endangered.gap_m).fold(f64::INFINITY, f64::min)
+pub(super) fn group_to_save(at_risk: &[ConnectorAtRisk], exit: Option<u32>) -> &[ConnectorAtRisk] {
+    let are_near = |a: &ConnectorAtRisk, b: &ConnectorAtRisk| b.k - a.k <= GROUP_DISTANCE;
+    let groups = || at_risk.chunk_by(are_near);
+    let least_gap_m = |group: &[ConnectorAtRisk]| {
+        group.iter().map(|at_risk| at_risk.gap_m).fold(f64::INFINITY, f64::min)
     };
     let nearest = groups().min_by(|a, b| least_gap_m(a).total_cmp(&least_gap_m(b)));
-    let Some(nearest) = nearest else { return endangered };
+    let Some(nearest) = nearest else { return at_risk };
     let Some(exit) = exit else { return around_nearest(nearest, |_| true) };
     let is_at_exit =
-        |group: &&[EndangeredConnector]| group.iter().any(|endangered| endangered.obstacle == exit);
-    let at_exit = |endangered: &EndangeredConnector| endangered.obstacle == exit;
+        |group: &&[ConnectorAtRisk]| group.iter().any(|at_risk| at_risk.obstacle == exit);
+    let at_exit = |at_risk: &ConnectorAtRisk| at_risk.obstacle == exit;
     if is_at_exit(&nearest) {
         return around_nearest(nearest, at_exit);
     }
-    let last = endangered.len() - 1;
-    if endangered[last].k - endangered[0].k < MAX_CONNECTORS {
-        return endangered;
+    let last = at_risk.len() - 1;
+    if at_risk[last].k - at_risk[0].k < MAX_CONNECTORS {
+        return at_risk;
     }
     let group = groups().find(is_at_exit);
     group.map_or(around_nearest(nearest, |_| true), |group| around_nearest(group, at_exit))
@@ -79,14 +71,14 @@ pub(super) fn group_to_save(
 /// Returns the part of a group around the one of some of its connectors that is nearest to an obstacle: a chain that is hemmed
 /// in along all of its length is one group, and a rollout of all of it would take the work of several seconds.
 fn around_nearest(
-    group: &[EndangeredConnector],
-    counts: impl Fn(&EndangeredConnector) -> bool,
-) -> &[EndangeredConnector] {
-    let some = group.iter().filter(|endangered| counts(endangered));
+    group: &[ConnectorAtRisk],
+    counts: impl Fn(&ConnectorAtRisk) -> bool,
+) -> &[ConnectorAtRisk] {
+    let some = group.iter().filter(|at_risk| counts(at_risk));
     let nearest = some.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
-    let Some(middle) = nearest.map(|endangered| endangered.k) else { return group };
-    let from = group.partition_point(|endangered| endangered.k + MAX_CONNECTORS / 2 < middle);
-    let to = group.partition_point(|endangered| endangered.k <= middle + MAX_CONNECTORS / 2);
+    let Some(middle) = nearest.map(|at_risk| at_risk.k) else { return group };
+    let from = group.partition_point(|at_risk| at_risk.k + MAX_CONNECTORS / 2 < middle);
+    let to = group.partition_point(|at_risk| at_risk.k <= middle + MAX_CONNECTORS / 2);
     &group[from..to]
 }
 
@@ -94,8 +86,8 @@ fn around_nearest(
 mod tests {
     use super::*;
 
-    fn group(from: usize, obstacle: u32, gap_m: f64) -> [EndangeredConnector; 2] {
-        [from, from + 20].map(|k| EndangeredConnector {
+    fn group(from: usize, obstacle: u32, gap_m: f64) -> [ConnectorAtRisk; 2] {
+        [from, from + 20].map(|k| ConnectorAtRisk {
             k,
             part: ChainPart::Connector(k),
             obstacle,
@@ -110,8 +102,8 @@ mod tests {
         hemmed_in[21].gap_m = 0.01;
         let saved = group_to_save(&hemmed_in, None);
         let middle = hemmed_in[21].k;
-        assert!(saved.iter().any(|endangered| endangered.gap_m == 0.01));
-        assert!(saved.iter().all(|endangered| endangered.k.abs_diff(middle) <= 50));
+        assert!(saved.iter().any(|at_risk| at_risk.gap_m == 0.01));
+        assert!(saved.iter().all(|at_risk| at_risk.k.abs_diff(middle) <= 50));
         assert!(saved[saved.len() - 1].k - saved[0].k >= 80, "{saved:?}");
         assert_eq!(group_to_save(&long[..4], Some(1)), &long[..4]);
     }

@@ -15,7 +15,7 @@ const MAX_RODS: usize = 64;
 const MAX_EFFORT: usize = 25_000;
 
 /// Returns a warning on the targets of each task of a chain on a fixed base for which no posture is found.
-pub(super) fn unreached_targets_remarks<const D: usize>(
+pub(super) fn no_posture_remarks<const D: usize>(
     world: &ChainWorld<D>,
     k: usize,
     spec: &ChainSpec<D>,
@@ -33,7 +33,7 @@ pub(super) fn unreached_targets_remarks<const D: usize>(
         if !spec.start.connectors()[base].is_still() {
             return None;
         }
-        let is_unreached = |target: usize| {
+        let has_no_posture = |target: usize| {
             let goal = ChainIkGoal {
                 engine: IkEngine::Dls,
                 tolerance_m: targets.tolerance_m,
@@ -45,8 +45,8 @@ pub(super) fn unreached_targets_remarks<const D: usize>(
         };
         let asked = searches.min(targets.places.len());
         searches -= asked;
-        let unreached = (0..asked).filter(|target| is_unreached(*target));
-        let numbers: Vec<String> = unreached.map(|target| target.to_string()).collect();
+        let without_posture = (0..asked).filter(|target| has_no_posture(*target));
+        let numbers: Vec<String> = without_posture.map(|target| target.to_string()).collect();
         if numbers.is_empty() {
             return None;
         }
