@@ -201,3 +201,35 @@ fn nothing_is_planned_for_a_chain_of_short_rods_that_is_in_nobodys_way() {
     let metrics = run.metrics();
     assert_eq!((metrics.progress, metrics.rungs.planned), (1.0, 0));
 }
+
+/// The rest of a long chain follows its start later; that must not show, whenever the chain is read.
+#[test]
+fn a_long_chain_that_is_read_in_each_cycle_is_as_one_that_is_read_at_the_end() {
+    let text = "seed = 1\ncycles = 900\n[chain]\ndimensions = 3\ndt_s = 0.02\n[[chains]]\nconnectors = 400\n\
+                rod_m = 0.1\nradius_m = 0.02\nrod_radius_m = 0.008\n\
+                tasks = [{ kind = \"targets\", speed_m_s = 0.5, \
+                targets_m = [[2.0, 0.5, 0.0], [1.0, 3.0, 1.0], [-4.0, 3.0, 0.5], [-4.0, -0.3, 0.0]] }]\n";
+    let source = scenario(text);
+    let start = || match AnyChainScenario::new(&source).expect("a scenario") {
+        AnyChainScenario::Space(scenario) => scenario.start(&source, 1),
+        AnyChainScenario::Plane(_) => panic!("it is in space"),
+    };
+    let mut at_the_end = start();
+    at_the_end.advance(900);
+    let mut in_each_cycle = start();
+    let mut followed_later = 0;
+    for _ in 0..900 {
+        in_each_cycle.advance(1);
+        let state = in_each_cycle.state();
+        followed_later += u32::from(!state.body_before_deferred_motions(0).deferred.is_empty());
+        state.apply_deferred_motions();
+    }
+    assert!(followed_later > 600, "{followed_later}");
+    assert_eq!(at_the_end.digest(), in_each_cycle.digest());
+    let moved = |run: &ChainRun<3>| {
+        let body = run.state().body(0);
+        let tally = &body.tally;
+        (tally.moved, tally.max_slave_step_m.to_bits(), tally.max_rod_violation_m.to_bits())
+    };
+    assert_eq!(moved(&at_the_end), moved(&in_each_cycle));
+}
