@@ -9,9 +9,11 @@ use crate::cycle::{Observer, PhaseTimes, Scratches};
 use crate::digest::Digest;
 use crate::engine::{CycleRange, Engine};
 use crate::interrupt::Interrupt;
-use crate::ports::{RecordError, Recorder, SystemClock, TableBuffer, TableRowsBuffer, TableSchema};
+use crate::ports::{
+    ColumnSpec, RecordError, Recorder, SystemClock, TableBuffer, TableRowsBuffer, TableSchema,
+};
 use crate::run_config::{GroupSizeHistogram, RunConfig, RunStats};
-use crate::series::MetricSeries;
+use crate::series::{MetricSeries, SeriesInterval, SeriesRows};
 use crate::simulation::Simulation;
 use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId};
@@ -65,6 +67,8 @@ pub struct Run<W: World> {
     control_rows: TableRowsBuffer<ControlRow>,
     /// Metrics over time that wait to be recorded.
     series: MetricSeries,
+    /// Metrics over time that wait to be taken, at cycles of their own.
+    watched_series: MetricSeries,
 }
 
 impl<W: ControllableWorld> Run<W> {
@@ -92,6 +96,7 @@ impl<W: ControllableWorld> Run<W> {
             order_rows: TableRowsBuffer::default(),
             control_rows: TableRowsBuffer::default(),
             series: MetricSeries::default(),
+            watched_series: MetricSeries::default(),
         }
     }
 }
@@ -155,7 +160,9 @@ impl<W: World> Run<W> {
     /// Number of cycles that may run before rows must be recorded.
     fn cycles_until_flush(&self) -> u64 {
         let cycles = self.world.cycles_until_flush(&self.state, &self.collector, self.cycle);
-        if self.order_rows.is_full() || self.control_rows.is_full() || self.series.is_full() {
+        let tables: [&dyn TableBuffer; 4] =
+            [&self.order_rows, &self.control_rows, &self.series, &self.watched_series];
+        if tables.iter().any(|rows| rows.is_full()) {
             // Not 0: a cycle adds no orders, which are given between cycles, and one row of metrics at most, and `advance`
             // promises to do at least one.
             cycles.min(1)
@@ -192,10 +199,16 @@ impl<W: World> Run<W> {
         (self.cycle / interval + 1).checked_mul(interval)
     }
 
+    /// Returns the first cycle after the present one after which metrics are kept.
+    fn next_row(&self) -> Option<Cycle> {
+        let rows = [&self.series, &self.watched_series].map(|rows| rows.next_due(self.cycle));
+        rows.into_iter().flatten().min()
+    }
+
     /// Returns the first cycle after the present one before which orders are replayed, or after which the world looks at
     /// its state or metrics are kept.
     fn next_stop(&self) -> Option<Cycle> {
-        let stops = [self.next_replay_cycle(), self.next_check(), self.series.next_due(self.cycle)];
+        let stops = [self.next_replay_cycle(), self.next_check(), self.next_row()];
         stops.into_iter().flatten().min()
     }
 }
@@ -287,14 +300,19 @@ impl<W: WorldMetrics> Run<W> {
         self.world.metrics(&self.state, &self.collector, self.cycle, &self.stats())
     }
 
-    /// Keeps the present metrics as a row of the run over time.
-    fn keep_metrics(&mut self) {
+    /// Keeps the present metrics as a row of the run over time, where one is due at the cycle `from` or after it.
+    fn keep_metrics(&mut self, from: Cycle) {
+        let cycle = self.cycle;
         let metrics = self.metrics();
-        self.series.push(self.cycle, &metrics);
+        for rows in [&mut self.series, &mut self.watched_series] {
+            if rows.next_due(from) == Some(cycle) {
+                rows.push(cycle, &metrics);
+            }
+        }
     }
 
-    /// Starts to keep metrics over time.
-    fn start_series(&mut self) {
+    /// Starts to keep metrics over time for a recorder.
+    fn start_recorded_series(&mut self) {
         let metrics = self.metrics();
         let interval = self.config.series_interval();
         self.series.start(interval, &metrics, |name| self.world.metric_meaning(name));
@@ -389,7 +407,8 @@ where
             if let Some(next) = self.next_stop() {
                 segment = segment.min(next - self.cycle);
             }
-            let next_row = self.series.next_due(self.cycle);
+            let from = self.cycle;
+            let next_row = self.next_row();
             let next_check = self.next_check();
             let segment_done = self.run_segment(segment);
             done += segment_done;
@@ -399,7 +418,7 @@ where
                 self.world.check(&mut self.state, &mut self.collector, self.cycle);
             }
             if next_row == Some(self.cycle) {
-                self.keep_metrics();
+                self.keep_metrics(from);
             }
             // Rows must be recorded, or the run is over: where a segment ends with the cycle that ends the run, its length
             // does not say so.
@@ -433,6 +452,7 @@ where
         self.cycle = cycle;
         self.last_applied = None;
         self.series.clear();
+        self.watched_series.clear();
         Ok(())
     }
 
@@ -446,7 +466,7 @@ where
         if self.world.records_controls(&self.collector) {
             self.control_rows.set_table(Some(control::controls_table()));
         }
-        self.start_series();
+        self.start_recorded_series();
         self.prepare_scratches();
     }
 
@@ -548,6 +568,23 @@ where
 
     fn metrics(&self) -> Value {
         serde_json::to_value(Run::metrics(self)).unwrap_or_default()
+    }
+
+    fn start_series(&mut self, interval: SeriesInterval) {
+        let metrics = Run::metrics(self);
+        self.watched_series.start(interval, &metrics, |name| self.world.metric_meaning(name));
+    }
+
+    fn series_columns(&self) -> &[ColumnSpec] {
+        self.watched_series.columns()
+    }
+
+    fn take_series(&mut self) -> SeriesRows {
+        self.watched_series.take_rows()
+    }
+
+    fn series_row(&self) -> Vec<f64> {
+        self.watched_series.number_row(&Run::metrics(self))
     }
 
     fn agent_metrics(&self) -> Value {

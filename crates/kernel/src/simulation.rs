@@ -7,8 +7,9 @@ use crate::control::{
 use crate::cycle::PhaseTimes;
 use crate::digest::Digest;
 use crate::interrupt::Interrupt;
-use crate::ports::{RecordError, Recorder, TableSchema};
+use crate::ports::{ColumnSpec, RecordError, Recorder, TableSchema};
 use crate::run_config::RunConfig;
+use crate::series::{SeriesInterval, SeriesRows};
 use crate::text::{JsonTextReport, KeyValues};
 use crate::units::{Cycle, EntityId};
 use crate::view::{
@@ -177,6 +178,26 @@ pub trait Simulation: Any + Send {
 
     /// Returns the metrics of the run so far, as JSON (`metrics` of the summary).
     fn metrics(&self) -> serde_json::Value;
+
+    /// Keeps the metrics from now on after the cycles of an interval, for [`Simulation::take_series`]. It is independent of
+    /// a recording, whose rows have an interval of their own. A recording that can only be shown has none.
+    fn start_series(&mut self, _: SeriesInterval) {}
+
+    /// The metrics that [`Simulation::take_series`] gives, which are numbers or truth values and measured by no clock, as
+    /// columns of a table; none before [`Simulation::start_series`].
+    fn series_columns(&self) -> &[ColumnSpec] {
+        &[]
+    }
+
+    /// Returns the rows since the last call. Those of an abandoned past, before [`Simulation::restore`], are forgotten.
+    fn take_series(&mut self) -> SeriesRows {
+        SeriesRows::default()
+    }
+
+    /// Returns the present metrics, one for each of the columns; NaN where a metric has no value.
+    fn series_row(&self) -> Vec<f64> {
+        Vec::new()
+    }
 
     /// Returns the metrics of each agent, as a JSON array.
     fn agent_metrics(&self) -> serde_json::Value;

@@ -50,6 +50,12 @@ pub trait WorldType: Send + Sync {
         &[]
     }
 
+    /// The names of the metrics that its runs are about, the most telling first: those that are charted where nobody has
+    /// chosen any. None of them is a processor time or an error of rounding.
+    fn chart_metrics(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// The kinds of bodies that its runs show: names in files and requests stand for these.
     fn kinds(&self) -> &'static [BodyKind] {
         &[]

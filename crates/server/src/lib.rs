@@ -6,7 +6,8 @@
 //! page.rs      files of the page     compress.rs  gzip                    socket.rs        one page
 //! protocol/    messages and frames   request.rs   text -> requests        outbox.rs        messages to be sent
 //! session/     one thread per run    keyframes.rs checkpoints for seeking encode/          frames as bytes
-//! samples.rs   metrics over time     event_store.rs  events               fleet_feed.rs    views of fleets
+//! metric_history.rs  metrics over time
+//! event_store.rs  events             fleet_feed.rs    views of fleets
 //! files.rs     readable files        write.rs     writable files          file_choices.rs  files for a text
 //! results/     reports, exports
 //! ```
@@ -25,12 +26,12 @@ mod http;
 mod keyframes;
 mod limits;
 mod listen;
+mod metric_history;
 mod outbox;
 mod page;
 pub mod protocol;
 mod request;
 mod results;
-mod samples;
 mod serve;
 mod session;
 mod socket;

@@ -8,6 +8,7 @@
 //! frame_sink/      frames into files                    picture.rs       pictures into files
 //! recorded_run.rs  recorded runs, computed again        replay.rs        ... and compared (compare.rs)
 //! playback/        ... of other builds, from their tables or messages
+//! recorded_series.rs  ... and their metrics over time
 //! export/          recorded runs in other formats       report/          folders -> documents
 //! sweep/           many runs of one scenario            summary.rs       the results of a run
 //! live/            viewers that watch and steer         pacer.rs         when a cycle is due
@@ -40,6 +41,7 @@ mod picture;
 mod playback;
 mod polling;
 mod recorded_run;
+mod recorded_series;
 mod replay;
 mod row_store;
 mod run_recorder;
@@ -70,6 +72,7 @@ pub use pacer::Pacer;
 pub use picture::{png_bytes, write_png};
 pub use polling::run_polling;
 pub use recorded_run::RecordedRun;
+pub use recorded_series::RecordedSeries;
 pub use replay::{ReplayReport, replay_all, replay_to};
 pub use row_store::RowSelection;
 pub use run_recorder::{RecordingPlan, RunRecorder};

@@ -19,11 +19,24 @@ export interface PlotHooks {
   onClick(cycle: number): void;
 }
 
+/** A metric whose values differ by less than this share of them is constant: the rest is an error of rounding. */
+const ROUNDING = 1e-9;
+
 /** The range of an axis: round, with zero if it is near, and not empty for constant values. */
 function rangeOf(low: number | null, high: number | null): uPlot.Range.MinMax {
   if (low === null || high === null) return [0, 1];
-  if (low === high) return low === 0 ? [0, 1] : [low - 0.5 * Math.abs(low), high + 0.5 * Math.abs(high)];
+  if (high - low <= ROUNDING * Math.max(Math.abs(low), Math.abs(high)))
+    return low === 0 ? [0, 1] : [low - 0.5 * Math.abs(low), high + 0.5 * Math.abs(high)];
   return uPlot.rangeNum(low, high, 0.1, true);
+}
+
+/** A value holds until the next cycle of which one is known; no line leads through values that no cycle had. */
+const steps = uPlot.paths.stepped!({ align: 1 });
+
+/** The range of the cycles: up to the one on the canvas, also where the metrics of the last ones are not known yet. */
+function cyclesUpTo(now: number, first: number | null, last: number | null): uPlot.Range.MinMax {
+  const start = first ?? 0;
+  return [start, Math.max(last ?? 0, now, start + 1)];
 }
 
 export class Plot {
@@ -45,12 +58,15 @@ export class Plot {
     const options: uPlot.Options = {
       ...size,
       legend: { show: false },
-      scales: { x: { time: false }, y: { range: (_, low, high) => rangeOf(low, high) } },
+      scales: {
+        x: { time: false, range: (_, first, last) => cyclesUpTo(this.#now, first, last) },
+        y: { range: (_, low, high) => rangeOf(low, high) },
+      },
       axes: [
         { ...axis, size: 26, gap: 5 },
         { ...axis, size: 54, gap: 4 },
       ],
-      series: [{}, { stroke: colors.curve, width: 1.5, points: { show: false } }],
+      series: [{}, { stroke: colors.curve, width: 1.5, points: { show: false }, paths: steps }],
       cursor: { y: false, drag: { x: false, y: false }, points: { size: 6, fill: colors.curve } },
       hooks: {
         setCursor: [(plot) => this.#onCursorMove(plot)],
@@ -75,8 +91,11 @@ export class Plot {
   /** Sets the cycle that the canvas shows. */
   setNow(cycle: number): void {
     if (cycle === this.#now) return;
+    const isBeyond = cycle > (this.#plot.scales.x!.max ?? 0);
     this.#now = cycle;
-    this.#plot.redraw(false);
+    // Setting the data anew sets the range of the cycles anew.
+    if (isBeyond) this.#plot.setData(this.#plot.data);
+    else this.#plot.redraw(false);
   }
 
   /** Sets the cycle under the pointer of the timeline or another chart. */

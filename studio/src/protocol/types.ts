@@ -117,7 +117,7 @@ frames: number, } | { "do": "inspect",
  */
 body: BodyId, } | { "do": "metrics",
 /**
- * The number of the first sample wanted.
+ * The number of the first row wanted.
  */
 from: number, } | { "do": "events",
 /**
@@ -299,22 +299,21 @@ status: SessionStatus, } | { "is": "inspection" } & Inspection | { "is": "metric
  */
 names: Array<MetricName>,
 /**
- * Number of the first sample here: the requested one, or the number of all samples.
+ * Number of the first row here: the requested one, or the number of all rows.
  */
 first: number,
 /**
- * How often every second sample was dropped, which renumbers the samples, since the session started:
- * request from 0 whenever it has changed.
- */
-thinned: number,
-/**
- * The cycle of each sample.
+ * The number of cycles done before each row.
  */
 cycles: Array<number>,
 /**
- * Values in each sample, metric by metric.
+ * Values in each row, metric by metric; null where a metric has none.
  */
-values: Array<Array<number | null>>, } | { "is": "events",
+values: Array<Array<number | null>>,
+/**
+ * The metrics of the session's present cycle; none of a recording that can only be shown.
+ */
+present: MetricRow | null, } | { "is": "events",
 /**
  * The events.
  */
@@ -475,7 +474,24 @@ label: string,
 /**
  * Its unit; may be empty.
  */
-unit: string, };
+unit: string,
+/**
+ * Whether it is among those that the world is about, which charts show without being asked. They come first.
+ */
+is_primary: boolean, };
+
+/**
+ * The metrics at one cycle.
+ */
+export type MetricRow = {
+/**
+ * The number of cycles done.
+ */
+cycle: number,
+/**
+ * A value for each metric; null where it has none.
+ */
+values: Array<number | null>, };
 
 /**
  * A message of the server without a request.

@@ -1,74 +1,106 @@
-/** Samples of a session's metrics. */
+/** A session's metrics over time: exact values at cycles that the server has kept by their numbers. */
 
-import type { ReplyBody, MetricName } from "../protocol";
+import type { MetricName, MetricRow, ReplyBody } from "../protocol";
+
+type MetricsReply = Extract<ReplyBody, { is: "metrics" }>;
+
+/** The value of a metric, and the cycle that it belongs to. */
+export interface CycleValue {
+  cycle: number;
+  /** Null where the metric has no value at this cycle. */
+  value: number | null;
+}
 
 export class Metrics {
   names = $state.raw<MetricName[]>([]);
-  /** Cycles of the samples, and a column for each metric; replaced when samples come. */
+  /** Cycles of the rows, and a column for each metric; replaced when rows come. */
   cycles = $state.raw<number[]>([]);
   columns = $state.raw<(number | null)[][]>([]);
-  /** The number of times that the server halved the number of samples, which renumbers them. */
-  #thinned = 0;
+  /** The metrics of one more cycle, at which the server was when it was asked last. */
+  present = $state.raw<MetricRow | null>(null);
   #isFetching = false;
   #age = 0;
+  /** The charts that were shown last without a choice. */
+  #shown: string[] = [];
 
   clear(): void {
     this.cycles = [];
     this.columns = [];
-    this.#thinned = 0;
+    this.present = null;
     this.#age++;
     this.#isFetching = false;
   }
 
-  /** Keys of the metrics in the order of their first change; constant ones last. */
-  get keysByFirstChange(): string[] {
-    const since = this.columns.map((column) => {
-      const at = column.findIndex((value) => value !== null && value !== column[0]);
-      return at < 0 ? Infinity : at;
-    });
-    const order = this.names.map((_, i) => i).sort((a, b) => (since[a] === since[b] ? a - b : since[a]! - since[b]!));
-    return order.map((i) => this.names[i]!.key);
+  /**
+   * The metrics to chart where nobody has chosen any: those that the world is about, and of these first the ones that
+   * have changed. A chart that shows something stays where it is.
+   */
+  defaultKeys(count: number): string[] {
+    const candidates = this.names.some((name) => name.is_primary)
+      ? this.names.filter((name) => name.is_primary)
+      : this.names;
+    const keys = candidates.map(({ key }) => key);
+    const changing = keys.filter((key) => this.#hasChanged(key));
+    const places = this.#shown.slice(0, count).map((key) => (changing.includes(key) ? key : null));
+    while (places.length < Math.min(count, keys.length)) places.push(null);
+    const rest = [...changing, ...keys].filter((key, i, all) => all.indexOf(key) === i && !places.includes(key));
+    this.#shown = places.map((key) => key ?? rest.shift()).filter((key) => key !== undefined);
+    return this.#shown;
   }
 
-  /** Fetches the samples since the last known one. */
+  /** The rows of a metric for a chart, with that of the present cycle in its place. */
+  curve(key: string): { cycles: number[]; values: (number | null)[] } {
+    const index = this.#indexOf(key);
+    const values = this.columns[index] ?? [];
+    const { cycles, present } = this;
+    if (!present || index < 0) return { cycles, values };
+    const at = cycles.findLastIndex((cycle) => cycle <= present.cycle) + 1;
+    if (cycles[at - 1] === present.cycle) return { cycles, values };
+    const value = present.values[index] ?? null;
+    return {
+      cycles: [...cycles.slice(0, at), present.cycle, ...cycles.slice(at)],
+      values: [...values.slice(0, at), value, ...values.slice(at)],
+    };
+  }
+
+  /** The value of a metric at the last cycle up to this one of which it is known. */
+  valueAt(key: string, cycle: number): CycleValue | null {
+    const { cycles, values } = this.curve(key);
+    const at = cycles.findLastIndex((one) => one <= cycle);
+    return at < 0 ? null : { cycle: cycles[at]!, value: values[at] ?? null };
+  }
+
+  /** Fetches the rows since the last known one, and the present metrics. */
   async fetch(ask: (from: number) => Promise<ReplyBody>): Promise<void> {
     if (this.#isFetching) return;
     const age = this.#age;
     this.#isFetching = true;
     try {
       const answer = await ask(this.cycles.length);
-      if (age !== this.#age || answer.is !== "metrics") return;
-      if (answer.thinned !== this.#thinned) this.#restart(answer.thinned);
-      else this.#append(answer);
+      if (age === this.#age && answer.is === "metrics") this.#append(answer);
     } finally {
       if (age === this.#age) this.#isFetching = false;
     }
   }
 
-  /** Starts over after a renumbering: the next request is for all samples. */
-  #restart(thinned: number): void {
-    this.#thinned = thinned;
-    this.cycles = [];
-    this.columns = [];
-  }
-
-  #append(answer: Extract<ReplyBody, { is: "metrics" }>): void {
+  #append(answer: MetricsReply): void {
     const isSame = sameNames(this.names, answer.names);
-    if (isSame && answer.cycles.length === 0 && answer.first === this.cycles.length) return;
-    const known = new Map(this.names.map(({ key }, i) => [key, this.columns[i] ?? []]));
-    this.cycles = [...this.cycles.slice(0, answer.first), ...answer.cycles];
-    this.columns = answer.names.map(({ key }, i) => [
-      ...padColumn(known.get(key) ?? [], answer.first),
-      ...(answer.values[i] ?? []),
-    ]);
     if (!isSame) this.names = answer.names;
+    if (!isSame || answer.present?.cycle !== this.present?.cycle) this.present = answer.present;
+    if (isSame && answer.cycles.length === 0 && answer.first === this.cycles.length) return;
+    this.cycles = [...this.cycles.slice(0, answer.first), ...answer.cycles];
+    this.columns = answer.values.map((values, i) => [...(this.columns[i] ?? []).slice(0, answer.first), ...values]);
   }
-}
 
-/** The first samples of a column; a metric that appeared later had no value before. */
-function padColumn(column: (number | null)[], length: number): (number | null)[] {
-  const missing = Math.max(0, length - column.length);
-  return [...column.slice(0, length), ...Array<null>(missing).fill(null)];
+  #indexOf(key: string): number {
+    return this.names.findIndex((name) => name.key === key);
+  }
+
+  /** Returns whether a metric has had two values, or has one since some cycle. */
+  #hasChanged(key: string): boolean {
+    const { values } = this.curve(key);
+    return values.some((value) => value !== null && value !== values[0]);
+  }
 }
 
 /** A metric's label with its unit. */

@@ -144,7 +144,7 @@ export class Session {
     this.#cancelWaits();
   }
 
-  /** Fetches events and samples; called regularly while the session is shown. */
+  /** Fetches events and metrics; called regularly while the session is shown. */
   refresh(withMetrics: boolean): void {
     if (this.client.ended) return;
     const { scene, status, lastCycle } = this.run;

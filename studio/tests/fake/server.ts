@@ -526,7 +526,9 @@ function model(text: string): ReplyBody {
 }
 
 function metrics(run: Run, from: number): ReplyBody {
-  const samples = Array.from({ length: Math.floor(run.cycle / 10) + 1 }, (_, i) => 10 * i).slice(from);
+  const cycles = Array.from({ length: Math.floor(run.cycle / 10) + 1 }, (_, i) => 10 * i).slice(from);
+  const value = (k: number, c: number): number | null =>
+    k === 3 && c < 50 ? null : (k + 1) * (2 + Math.sin(c / (20 + 9 * k)));
   const names = [
     ["contacts", "contacts per cycle", ""],
     ["speed", "mean speed", "m/s"],
@@ -535,12 +537,10 @@ function metrics(run: Run, from: number): ReplyBody {
   ];
   return {
     is: "metrics",
-    names: names.map(([key, label, unit]) => ({ key: key!, label: label!, unit: unit! })),
+    names: names.map(([key, label, unit]) => ({ key: key!, label: label!, unit: unit!, is_primary: true })),
     first: from,
-    thinned: 0,
-    cycles: samples,
-    values: names.map((_, k) =>
-      samples.map((c) => (k === 3 && c < 50 ? null : (k + 1) * (2 + Math.sin(c / (20 + 9 * k))))),
-    ),
+    cycles,
+    values: names.map((_, k) => cycles.map((c) => value(k, c))),
+    present: { cycle: run.cycle, values: names.map((_, k) => value(k, run.cycle)) },
   };
 }

@@ -1,43 +1,75 @@
-/** Samples belong to the cycles at which they were taken, also those of metrics that appear later. */
+/** Values belong to the cycles of their rows; charts show first what the world is about. */
 
 import { expect, test } from "vitest";
-import type { ReplyBody } from "../../src/protocol";
+import type { MetricRow, ReplyBody } from "../../src/protocol";
 import { Metrics } from "../../src/state/metrics.svelte";
 
-function answered(
-  keys: string[],
-  first: number,
-  cycles: number[],
-  values: (number | null)[][],
-): () => Promise<ReplyBody> {
-  const names = keys.map((key) => ({ key, label: key, unit: "" }));
-  return () => Promise.resolve({ is: "metrics", names, first, thinned: 0, cycles, values });
+interface Rows {
+  first?: number;
+  cycles: number[];
+  values: (number | null)[][];
+  present?: MetricRow;
 }
 
-test("a metric that appears later has no value before", async () => {
+/** A server with metrics `a`, `b`, ... of which some are those that the world is about. */
+function answered(
+  { first = 0, cycles, values, present }: Rows,
+  primary: readonly string[] = [],
+): () => Promise<ReplyBody> {
+  const keys = values.map((_, i) => "abcdef"[i]!);
+  const names = keys.map((key) => ({ key, label: key, unit: "", is_primary: primary.includes(key) }));
+  return () => Promise.resolve({ is: "metrics", names, first, cycles, values, present: present ?? null });
+}
+
+test("rows are appended, and told once", async () => {
   const metrics = new Metrics();
-  await metrics.fetch(answered(["a"], 0, [0, 10], [[1, 2]]));
-  await metrics.fetch(answered(["a", "b"], 2, [20], [[3], [9]]));
-  expect(metrics.columns).toEqual([
-    [1, 2, 3],
-    [null, null, 9],
-  ]);
+  await metrics.fetch(answered({ cycles: [0, 10], values: [[1, 2]] }));
+  await metrics.fetch(answered({ first: 2, cycles: [20], values: [[null]] }));
+  await metrics.fetch(answered({ first: 3, cycles: [], values: [[]] }));
+  expect([metrics.cycles, metrics.columns]).toEqual([[0, 10, 20], [[1, 2, null]]]);
 });
 
-test("a metric that appears before others does not take their columns", async () => {
+test("the present cycle has its place among the rows, and a row of its own is not doubled", async () => {
   const metrics = new Metrics();
-  await metrics.fetch(answered(["b"], 0, [0, 10], [[1, 2]]));
-  await metrics.fetch(answered(["a", "b"], 2, [20], [[9], [3]]));
-  expect(metrics.columns).toEqual([
-    [null, null, 9],
-    [1, 2, 3],
-  ]);
+  const at = (cycle: number, value: number): MetricRow => ({ cycle, values: [value] });
+  await metrics.fetch(answered({ cycles: [0, 10, 20], values: [[1, 2, 3]], present: at(14, 7) }));
+  expect(metrics.curve("a")).toEqual({ cycles: [0, 10, 14, 20], values: [1, 2, 7, 3] });
+  await metrics.fetch(answered({ first: 3, cycles: [], values: [[]], present: at(10, 2) }));
+  expect(metrics.curve("a").cycles).toEqual([0, 10, 20]);
+  await metrics.fetch(answered({ first: 3, cycles: [], values: [[]], present: at(25, 9) }));
+  expect(metrics.curve("a").values).toEqual([1, 2, 3, 9]);
 });
 
-test("a new name without a new sample has a column", async () => {
+test("a value between two rows is that of the earlier one, with its cycle", async () => {
   const metrics = new Metrics();
-  await metrics.fetch(answered(["a"], 0, [0], [[1]]));
-  await metrics.fetch(answered(["a", "b"], 1, [], [[], []]));
-  expect(metrics.columns).toEqual([[1], [null]]);
-  expect(metrics.keysByFirstChange.length).toBe(2);
+  await metrics.fetch(answered({ cycles: [0, 10], values: [[1, null]] }));
+  expect(metrics.valueAt("a", 9)).toEqual({ cycle: 0, value: 1 });
+  expect(metrics.valueAt("a", 4000)).toEqual({ cycle: 10, value: null });
+  expect(new Metrics().valueAt("a", 9)).toBeNull();
+});
+
+test("charts show what the world is about and has changed, and keep their places", async () => {
+  const metrics = new Metrics();
+  const primary = ["a", "b", "c"];
+  await metrics.fetch(answered({ cycles: [0], values: [[0], [0], [0], [5]] }, primary));
+  expect(metrics.defaultKeys(2)).toEqual(["a", "b"]);
+  await metrics.fetch(answered({ first: 1, cycles: [10], values: [[0], [0], [4], [6]] }, primary));
+  expect(metrics.defaultKeys(2)).toEqual(["c", "a"]);
+  await metrics.fetch(answered({ first: 2, cycles: [20], values: [[1], [1], [4], [7]] }, primary));
+  expect(metrics.defaultKeys(2)).toEqual(["c", "a"]);
+});
+
+test("a world that names no metrics shows its first ones", async () => {
+  const metrics = new Metrics();
+  await metrics.fetch(
+    answered({
+      cycles: [0, 10],
+      values: [
+        [0, 0],
+        [0, 1],
+        [2, 2],
+      ],
+    }),
+  );
+  expect(metrics.defaultKeys(2)).toEqual(["b", "a"]);
 });

@@ -74,6 +74,15 @@ impl LeafValue {
         }
     }
 
+    /// Returns the value as a number of any column: truth values are 0 and 1, and what is missing is no number (NaN).
+    pub(crate) fn number(&self) -> f64 {
+        match *self {
+            Self::Length(length) => length as f64,
+            Self::Truth(value) => f64::from(u8::from(value)),
+            _ => self.float().unwrap_or(f64::NAN),
+        }
+    }
+
     fn kind(self) -> LeafKind {
         match self {
             Self::Unsigned(_) => LeafKind::Unsigned,

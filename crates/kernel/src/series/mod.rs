@@ -3,6 +3,7 @@
 //! ```text
 //! interval.rs   the cycles that have a row, by their numbers alone
 //! leaves.rs     metrics -> numbers, in the order of their fields
+//! rows.rs       rows as numbers, for charts and sweeps
 //! ```
 //!
 //! The columns are the metrics that are numbers or truth values, by dotted name, as in tables of sweeps. Metrics that
@@ -10,16 +11,18 @@
 
 mod interval;
 mod leaves;
+mod rows;
 
 pub use interval::SeriesInterval;
+pub use rows::SeriesRows;
 
 use crate::ports::{ColumnSpec, ColumnType, ColumnValues, TableBuffer, TableSchema};
 use crate::units::Cycle;
 use leaves::{LeafKind, LeafValue, leaf_specs, leaf_values};
 use serde::Serialize;
 
-/// Name of the table.
-const TABLE: &str = "series";
+/// Name of the table, in which the column `cycle` has the number of the last cycle done: one less than [`SeriesRows`] say.
+pub const SERIES_TABLE: &str = "series";
 
 /// Endings of the names of metrics that a clock measured.
 const CLOCK_METRIC_SUFFIXES: [&str; 2] = ["cpu_s", "wall_s"];
@@ -78,17 +81,44 @@ impl MetricSeries {
     /// Keeps the metrics of a run after so many cycles.
     pub(crate) fn push(&mut self, cycles_done: Cycle, metrics: &impl Serialize) {
         let Some(last) = cycles_done.checked_sub(1) else { return };
+        let row = self.row_of(metrics);
+        self.cycles.push(last);
+        self.values.extend(row);
+    }
+
+    /// Returns the values of the columns in some metrics.
+    fn row_of(&self, metrics: &impl Serialize) -> Vec<LeafValue> {
         let leaves = leaf_values(metrics, self.has_column.len());
         debug_assert_eq!(
             leaves.len(),
             self.has_column.len(),
             "metrics have the same fields in every cycle"
         );
-        self.cycles.push(last);
-        let first = self.values.len();
         let kept = leaves.into_iter().zip(&self.has_column).filter(|(_, has_column)| **has_column);
-        self.values.extend(kept.map(|(value, _)| value));
-        self.values.resize(first + self.columns.len(), LeafValue::Missing);
+        let mut row: Vec<_> = kept.map(|(value, _)| value).collect();
+        row.resize(self.columns.len(), LeafValue::Missing);
+        row
+    }
+
+    /// The columns after that of the cycles; none before the series is started.
+    pub(crate) fn columns(&self) -> &[ColumnSpec] {
+        &self.columns
+    }
+
+    /// Returns the present metrics as numbers, one for each column.
+    pub(crate) fn number_row(&self, metrics: &impl Serialize) -> Vec<f64> {
+        self.row_of(metrics).iter().map(LeafValue::number).collect()
+    }
+
+    /// Takes the waiting rows as numbers.
+    pub(crate) fn take_rows(&mut self) -> SeriesRows {
+        let width = self.columns.len();
+        let column =
+            |index| self.values.iter().skip(index).step_by(width).map(LeafValue::number).collect();
+        let columns = (0..width).map(column).collect();
+        let cycles_done = self.cycles.iter().map(|last| last + 1).collect();
+        self.clear();
+        SeriesRows { cycles_done, columns }
     }
 
     /// Forgets the waiting rows: they belong to an abandoned past.
@@ -117,7 +147,7 @@ impl TableBuffer for MetricSeries {
         let meaning = "the metrics after this cycle, which are those of a run of one cycle more than its number";
         let mut columns = vec![ColumnSpec::new("cycle", ColumnType::U64, meaning)];
         columns.extend(self.columns.iter().cloned());
-        Some(TableSchema::new(TABLE, columns))
+        Some(TableSchema::new(SERIES_TABLE, columns))
     }
 
     fn row_count(&self) -> usize {

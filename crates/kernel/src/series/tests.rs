@@ -119,3 +119,22 @@ fn the_cycles_with_rows_do_not_depend_on_where_a_run_was_interrupted() {
         assert_eq!(interval.next_due(done), next.or(interval.next_due(20_000 - 1)), "after {done}");
     }
 }
+
+#[test]
+fn rows_as_numbers_have_the_cycles_done_and_no_number_for_what_is_missing() {
+    let mut series = MetricSeries::default();
+    series.start(SeriesInterval::every_cycles(5), &sample(0, None), words);
+    series.push(5, &sample(1, None));
+    series.push(10, &sample(2, Some(1.5)));
+    let rows = series.take_rows();
+    assert_eq!(rows.cycles_done, [5, 10]);
+    let column = |name: &str| {
+        let at = series.columns().iter().position(|column| column.name == name);
+        &rows.columns[at.expect("a column")]
+    };
+    assert_eq!(*column("trips"), [1.0, 2.0]);
+    assert!(column("mean")[0].is_nan() && column("mean")[1] == 1.5);
+    assert_eq!(*column("is_done"), [0.0, 1.0]);
+    assert!(rows.columns.len() == series.columns().len() && series.take_rows().is_empty());
+    assert_eq!(rows.row(1).next(), Some(2.0));
+}

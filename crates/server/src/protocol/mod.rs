@@ -38,7 +38,7 @@ mod typescript;
 pub use edit::Edit;
 pub use fleet::{Fleet, FleetNode};
 pub use reply::{
-    FileEntry, FileKind, MetricName, Problem, Reply, ReplyBody, ReplyResult, ServerNotification,
+    FileEntry, FileKind, MetricName, MetricRow, Problem, Reply, ReplyBody, ReplyResult, ServerNotification,
     SessionState, SessionStatus, SweepRun, TargetRef,
 };
 pub use request::{

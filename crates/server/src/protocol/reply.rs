@@ -58,19 +58,18 @@ pub enum ReplyBody {
     },
     /// Facts and marks of a body: its percepts, decisions and actions.
     Inspection(#[cfg_attr(test, ts(type = "Inspection"))] Inspection),
-    /// Samples of all metrics.
+    /// The rows of all metrics.
     Metrics {
         /// The metrics.
         names: Vec<MetricName>,
-        /// Number of the first sample here: the requested one, or the number of all samples.
+        /// Number of the first row here: the requested one, or the number of all rows.
         first: u32,
-        /// How often every second sample was dropped, which renumbers the samples, since the session started:
-        /// request from 0 whenever it has changed.
-        thinned: u32,
-        /// The cycle of each sample.
+        /// The number of cycles done before each row.
         cycles: Vec<f64>,
-        /// Values in each sample, metric by metric.
+        /// Values in each row, metric by metric; null where a metric has none.
         values: Vec<Vec<Option<f64>>>,
+        /// The metrics of the session's present cycle; none of a recording that can only be shown.
+        present: Option<MetricRow>,
     },
     /// Events, the oldest first.
     Events {
@@ -340,4 +339,16 @@ pub struct MetricName {
     pub label: String,
     /// Its unit; may be empty.
     pub unit: String,
+    /// Whether it is among those that the world is about, which charts show without being asked. They come first.
+    pub is_primary: bool,
+}
+
+/// The metrics at one cycle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct MetricRow {
+    /// The number of cycles done.
+    pub cycle: f64,
+    /// A value for each metric; null where it has none.
+    pub values: Vec<Option<f64>>,
 }

@@ -151,9 +151,9 @@ pub enum RunMethod {
         /// The body.
         body: BodyId,
     },
-    /// Asks for samples of all metrics, from the sample with this number on.
+    /// Asks for the rows of all metrics, from the row with this number on, and for those of the present cycle.
     Metrics {
-        /// The number of the first sample wanted.
+        /// The number of the first row wanted.
         from: u32,
     },
     /// Asks for the events so far between two cycles (`from` included, `until` excluded), at most `limit`, after the

@@ -46,6 +46,7 @@ fn types() -> String {
         FileEntry,
         FileKind,
         MetricName,
+        MetricRow,
         ServerNotification,
         TargetRef,
         SessionStatus,

@@ -4,6 +4,7 @@
 
 use super::history::RunHistory;
 use super::pace::CyclesPerSlice;
+use sidestep_kernel::series::SeriesInterval;
 use sidestep_kernel::view::FrameOptions;
 use sidestep_kernel::{Cycle, Interrupt, Simulation};
 use std::time::{Duration, Instant};
@@ -27,6 +28,12 @@ impl AheadRun {
         Self { run, until, pace: CyclesPerSlice::default(), events_taken: Instant::now() }
     }
 
+    /// Keeps the metrics after the cycles of an interval too.
+    pub(super) fn with_series(mut self, interval: SeriesInterval) -> Self {
+        self.run.start_series(interval);
+        self
+    }
+
     /// Advances for some milliseconds. Returns the run once it is at its end.
     pub(super) fn advance_slice(&mut self, history: &mut RunHistory) -> Option<&dyn Simulation> {
         self.skip_computed_cycles(history);
@@ -35,7 +42,7 @@ impl AheadRun {
         let done = self.run.advance(cycles);
         let computing_time = started.elapsed();
         self.pace.adapt_cycles_per_slice(done, computing_time);
-        history.record(self.run.as_ref(), computing_time);
+        history.record(self.run.as_mut(), computing_time);
         let is_at_end = self.run.cycle() >= self.until || self.run.is_over() || done == 0;
         if is_at_end || self.events_taken.elapsed() >= EVENTS_INTERVAL {
             history.log.record_ahead(&mut self.run.frame(FrameOptions::WITHOUT_SCANS));

@@ -8,12 +8,13 @@ use crate::encode::problem;
 use crate::files::AllowedFiles;
 use crate::fleet_feed::FleetFeed;
 use crate::keyframes::MemoryBudget;
+use crate::metric_history::MetricWords;
 use crate::protocol::{Problem, ReplyBody};
 use sidestep_kernel::shell::shell_quote;
 use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, Simulation};
-use sidestep_scenario::{MetricInfo, Source, Worlds};
-use sidestep_session::{Error, RecordedRun, read_scenario};
+use sidestep_scenario::{Source, Worlds};
+use sidestep_session::{Error, RecordedRun, RecordedSeries, read_scenario};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -285,10 +286,19 @@ impl OpenRun {
         self.deps.worlds.kinds()
     }
 
-    /// Returns the descriptions of the world's metrics.
-    pub(crate) fn metric_infos(&self) -> &'static [MetricInfo] {
+    /// Returns the world's words for its metrics.
+    pub(crate) fn metric_words(&self) -> MetricWords {
         let world_type = self.deps.worlds.find(self.run.world_name());
-        world_type.map_or(&[], |world_type| world_type.metric_infos())
+        world_type.map_or_else(MetricWords::default, MetricWords::from_world)
+    }
+
+    /// Returns the metrics over time of a recording that has some.
+    ///
+    /// # Errors
+    /// When they can no longer be read.
+    pub(crate) fn recorded_series(&self) -> Result<Option<RecordedSeries>, Problem> {
+        let recorded = self.recorded.as_ref();
+        recorded.map_or(Ok(None), |recorded| recorded.series().map_err(|e| problem(&e)))
     }
 
     /// Returns the names of the recorded tables; none if it has no tables.

@@ -62,18 +62,16 @@ impl Player {
         interrupt: Interrupt,
         open_run: OpenRun,
     ) -> Result<Self, Problem> {
+        let mut open_run = open_run;
         let scenery = open_run.run.scenery();
+        let history = RunHistory::from_run(&mut open_run)?;
         let mut player = Self {
             session,
             publisher: SessionUpdatePublisher::new(session, outbox.clone(), &scenery),
             foxglove: FoxgloveLease::new(open_run.foxglove_host(), session),
             outbox,
             interrupt,
-            history: RunHistory::from_run(
-                open_run.run.as_ref(),
-                open_run.metric_infos(),
-                open_run.keyframe_budget(),
-            ),
+            history,
             prefetcher: None,
             state: SessionState::Paused,
             speed: Speed::Times(1.0),
@@ -102,7 +100,8 @@ impl Player {
         self.prefetcher = self
             .open_run
             .start_prefetch_replay()
-            .map(|run| AheadRun::new(run, self.open_run.until, self.interrupt.clone()));
+            .map(|run| AheadRun::new(run, self.open_run.until, self.interrupt.clone()))
+            .map(|ahead| ahead.with_series(self.history.metrics.interval()));
         self.pause();
     }
 
@@ -111,11 +110,7 @@ impl Player {
         self.open_run.restart(seed, text)?;
         self.scenery = self.open_run.run.scenery();
         self.publisher.restart(&self.scenery);
-        self.history = RunHistory::from_run(
-            self.open_run.run.as_ref(),
-            self.open_run.metric_infos(),
-            self.open_run.keyframe_budget(),
-        );
+        self.history = RunHistory::from_run(&mut self.open_run)?;
         self.digest = None;
         self.slice = CyclesPerSlice::default();
         self.rate = CycleRate::default();
@@ -191,7 +186,9 @@ impl Player {
                 let kinds = self.open_run.kinds();
                 inspection(self.open_run.run.as_ref(), &body, &kinds).map(ReplyBody::Inspection)
             }
-            RunMethod::Metrics { from } => Ok(self.history.samples.samples_reply(from)),
+            RunMethod::Metrics { from } => {
+                Ok(self.history.metrics.metrics_reply(self.open_run.run.as_ref(), from))
+            }
             RunMethod::Events { from, until, skip, limit } => {
                 let run = self.open_run.run.as_mut();
                 self.publisher.record_events(run, &mut self.history.log, Instant::now());
@@ -251,7 +248,7 @@ impl Player {
         Ok(ReplyBody::Done)
     }
 
-    /// Pauses at the present cycle, whose metrics and digest are then on display.
+    /// Pauses at the present cycle, whose digest is then on display.
     fn pause(&mut self) {
         let is_at_end = self.is_at_end();
         self.state = if is_at_end { SessionState::Over } else { SessionState::Paused };
@@ -259,7 +256,6 @@ impl Player {
         self.rate = CycleRate::default();
         self.publisher.request_frame();
         let cycle = self.cycle();
-        self.history.record_sample_at_pause(self.open_run.run.as_ref());
         if self.digest.as_ref().is_none_or(|(digest_cycle, _)| *digest_cycle != cycle) {
             self.digest = Some((cycle, self.open_run.run.digest().to_string()));
         }
@@ -348,7 +344,7 @@ impl Player {
         self.rate.record(Instant::now(), done);
         self.publisher.mark_cycle_changed();
         self.digest = None;
-        self.history.record(self.open_run.run.as_ref(), computing_time);
+        self.history.record(self.open_run.run.as_mut(), computing_time);
     }
 
     /// Computes a recording ahead for some milliseconds; returns whether there was anything left to compute.

@@ -64,6 +64,10 @@ impl WorldType for Airspace {
         &super::metric_info::METRIC_INFO
     }
 
+    fn chart_metrics(&self) -> &'static [&'static str] {
+        &super::metric_info::CHART_METRICS
+    }
+
     fn kinds(&self) -> &'static [BodyKind] {
         super::kinds::ALL
     }

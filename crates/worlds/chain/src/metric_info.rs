@@ -4,6 +4,10 @@ use super::metrics::{ArmMetrics, EscapeTally, Metrics, RobotMetrics, RungTally};
 use sidestep_scenario::MetricInfo;
 use std::sync::LazyLock;
 
+/// The metrics that charts show first.
+pub(super) const CHART_METRICS: [&str; 6] =
+    ["vetoes", "min_clearance_m", "progress", "min_own_gap_m", "penetrations", "rotations"];
+
 /// Every metric of this world: the fields of its structs, and names that only tables have.
 pub(super) static METRIC_INFO: LazyLock<Vec<MetricInfo>> = LazyLock::new(|| {
     let mut infos = Vec::new();

@@ -7,7 +7,7 @@ use sidestep_session::{ManagedRun, NoWatcher, OutputPaths, RecordedRun};
 use std::path::PathBuf;
 
 /// Records a scenario into the folder `r`.
-fn recorded(text: &str) -> tempfile::TempDir {
+pub(super) fn recorded(text: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let (run, source) = (folder.path().join("r"), Source::new("s.toml", text, ""));
     let compiled = WORLDS.compile(&source).expect("valid");
@@ -22,7 +22,7 @@ fn path(folder: &tempfile::TempDir) -> PathBuf {
 }
 
 /// Turns a recording into one of another version of the program.
-fn made_by_another(folder: &tempfile::TempDir) {
+pub(super) fn made_by_another(folder: &tempfile::TempDir) {
     let manifest = path(folder).join("run.json");
     let text = std::fs::read_to_string(&manifest).expect("a manifest");
     let mut value: Value = serde_json::from_str(&text).expect("JSON");
@@ -31,7 +31,7 @@ fn made_by_another(folder: &tempfile::TempDir) {
     std::fs::write(manifest, text).expect("written");
 }
 
-fn opened(folder: tempfile::TempDir) -> (Page, Value) {
+pub(super) fn opened(folder: tempfile::TempDir) -> (Page, Value) {
     let what = OpenTarget::Recording { path: path(&folder).display().to_string() };
     Page::open_target(deps(folder.path(), 2), what, folder)
 }
@@ -191,7 +191,7 @@ fn a_recording_of_another_build_says_so_and_has_its_events_but_no_inspection_and
 
 /// Waits until a recorded run is computed again. Even without being played, it is computed ahead: then all events are
 /// known, and the digest is confirmed.
-fn wait_for_verdict(page: &mut Page) {
+pub(super) fn wait_for_verdict(page: &mut Page) {
     page.until("the verdict", |page| {
         let told = page
             .notices

@@ -1,0 +1,131 @@
+//! The metrics of a run over time, for charts: exact values after cycles that follow from their numbers alone.
+//!
+//! The run itself keeps the rows while it advances, so that neither the load of the machine nor the way of a page through
+//! the run decides which cycles have one. Rows begin with the first and leave none out: whoever computes a cycle first,
+//! the played run or the one ahead of it, has computed all cycles before.
+
+use crate::protocol::{MetricName, MetricRow, ReplyBody};
+use sidestep_kernel::series::{SeriesInterval, SeriesRows};
+use sidestep_kernel::{Cycle, Simulation};
+use sidestep_scenario::{MetricInfo, MetricLabel, WorldType, metric_label};
+use sidestep_session::RecordedSeries;
+
+/// A recording with fewer rows than this is computed for its charts: a run of millions of planned cycles that was
+/// interrupted early has a few rows.
+const MIN_RECORDED_ROWS: usize = 200;
+
+/// The words of a world for its metrics, and its choice for charts.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct MetricWords {
+    infos: &'static [MetricInfo],
+    chart_metrics: &'static [&'static str],
+}
+
+impl MetricWords {
+    pub(crate) fn from_world(world_type: &dyn WorldType) -> Self {
+        Self {
+            infos: world_type.metric_infos(),
+            chart_metrics: world_type.chart_metrics(),
+        }
+    }
+
+    /// Returns the place of a metric among those that charts show first; those that they do not have the last.
+    fn rank(&self, key: &str) -> usize {
+        let place = self.chart_metrics.iter().position(|name| *name == key);
+        place.unwrap_or(self.chart_metrics.len())
+    }
+
+    fn metric_name(&self, key: &str) -> MetricName {
+        let MetricLabel { words, unit, .. } = metric_label(self.infos, key);
+        MetricName {
+            key: key.into(),
+            label: words,
+            unit: unit.unwrap_or_default().into(),
+            is_primary: self.rank(key) < self.chart_metrics.len(),
+        }
+    }
+}
+
+/// The metrics of one run over time.
+pub(crate) struct MetricHistory {
+    interval: SeriesInterval,
+    names: Vec<MetricName>,
+    /// For each name, its column in the rows.
+    columns: Vec<usize>,
+    rows: SeriesRows,
+}
+
+impl MetricHistory {
+    /// Starts with a run that is at its start, and the rows that are recorded of it, if there are any. A recording that
+    /// can only be shown has no others.
+    pub(crate) fn from_run(
+        run: &mut dyn Simulation,
+        until: Cycle,
+        recorded: Option<RecordedSeries>,
+        words: MetricWords,
+    ) -> Self {
+        let interval = SeriesInterval::from_planned_cycles(until);
+        run.start_series(interval);
+        let computed_keys: Vec<String> =
+            run.series_columns().iter().map(|column| column.name.clone()).collect();
+        let recorded = recorded.filter(|series| {
+            let is_enough = series.rows.len() >= MIN_RECORDED_ROWS && series.names == computed_keys;
+            computed_keys.is_empty() || is_enough
+        });
+        let columns = vec![Vec::new(); computed_keys.len()];
+        let mut rows = SeriesRows { columns, ..SeriesRows::default() };
+        if !computed_keys.is_empty() {
+            rows.push(run.cycle(), run.series_row());
+        }
+        let mut history = Self { interval, names: Vec::new(), columns: Vec::new(), rows };
+        let keys = match recorded {
+            None => computed_keys,
+            Some(series) => {
+                history.rows.columns.resize(series.names.len(), Vec::new());
+                history.add(&series.rows);
+                series.names
+            }
+        };
+        let mut order: Vec<usize> = (0..keys.len()).collect();
+        order.sort_by_key(|&column| words.rank(&keys[column]));
+        history.names = order.iter().map(|&column| words.metric_name(&keys[column])).collect();
+        history.columns = order;
+        history
+    }
+
+    /// The cycles after which rows are wanted of any computation of the run.
+    pub(crate) fn interval(&self) -> SeriesInterval {
+        self.interval
+    }
+
+    /// Adds the rows that a computation of the run has kept, as far as they are new.
+    pub(crate) fn add(&mut self, rows: &SeriesRows) {
+        let last = self.rows.cycles_done.last().copied();
+        let known = rows.cycles_done.partition_point(|&cycle| Some(cycle) <= last);
+        for row in known..rows.len() {
+            self.rows.push(rows.cycles_done[row], rows.row(row));
+        }
+    }
+
+    /// Returns the rows from a number on, none if there are not so many, and the row of the run's present cycle.
+    pub(crate) fn metrics_reply(&self, run: &dyn Simulation, from: u32) -> ReplyBody {
+        let first = (from as usize).min(self.rows.len());
+        let present = run.series_row();
+        let column = |&column: &usize| self.rows.columns[column][first..].iter();
+        ReplyBody::Metrics {
+            names: self.names.clone(),
+            first: first as u32,
+            cycles: self.rows.cycles_done[first..].iter().map(|&cycle| cycle as f64).collect(),
+            values: self.columns.iter().map(|at| column(at).map(|v| known(*v)).collect()).collect(),
+            present: (!present.is_empty()).then(|| MetricRow {
+                cycle: run.cycle() as f64,
+                values: self.columns.iter().map(|&column| known(present[column])).collect(),
+            }),
+        }
+    }
+}
+
+/// Returns a value that a metric has.
+fn known(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
