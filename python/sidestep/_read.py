@@ -48,7 +48,8 @@ class Tables(Mapping[str, Table]):
 def read(folder: str | os.PathLike[str], tables: Sequence[str] | None = None) -> Tables:
     """Returns the tables of a run folder or a sweep's folder by name; each is read on first access.
 
-    ``tables`` lists the tables to return; by default all. A table of an unfinished run ends at its last checkpoint. A sweep has ``results``, one row per finished run, and ``timings``.
+    ``tables`` lists the tables to return; by default all. A table of an unfinished run ends at its last checkpoint. A sweep has ``results``, one row per finished run, ``timings``, and
+    ``series``, metrics over time.
 
     Raises InputError when there is no such folder or table.
 

@@ -24,6 +24,12 @@ class Sweep:
     results: Table
     #: Measured times of each run in seconds; they differ if the sweep is repeated.
     timings: Table
+    #: Metrics over time that the world is about, one row per run and cycle (the number of cycles done); without rows for
+    #: more than 20,000 runs.
+    series: Table
+    #: Their means over the runs of each variant, with 95 % intervals: one row per variant, metric and cycle. A run that
+    #: was over before a cycle has the metrics of its end there.
+    bands: Table
     #: The output of ``sidestep sweep --json``: ``summary`` has every metric with intervals and comparisons.
     output: dict[str, Any]
 

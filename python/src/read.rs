@@ -10,7 +10,7 @@ use sidestep_session::sweep::{self, Folder};
 use std::path::{Path, PathBuf};
 
 /// The tables of a sweep's folder.
-const SWEEP_TABLES: [&str; 2] = ["results", "timings"];
+const SWEEP_TABLES: [&str; 3] = ["results", "timings", "series"];
 
 /// Returns the names of the tables of a run folder or a sweep's folder.
 ///
@@ -64,11 +64,15 @@ fn read_sweep_folder<'py>(
     let finished = py.detach(|| {
         let folder = Folder::open(folder)?;
         let finished = sweep::read_finished(&folder)?;
-        Ok((finished.table, folder.plan().world.clone()))
+        Ok((finished.table, finished.series, folder.plan().world.clone()))
     });
-    let (table, world) = finished.map_err(|e: InputError| error::input_error(&e))?;
+    let (table, series, world) = finished.map_err(|e: InputError| error::input_error(&e))?;
     let dict = PyDict::new(py);
-    for (name, columns) in SWEEP_TABLES.into_iter().zip([table.results(), table.timings()]) {
+    for (name, columns) in SWEEP_TABLES.into_iter().zip([
+        table.results(),
+        table.timings(),
+        series.columns.iter().collect(),
+    ]) {
         if names.is_none_or(|names| names.iter().any(|other| other == name)) {
             let columns = columns.into_iter().cloned().collect();
             dict.set_item(name, Table::from_runs(name, columns, &world)?)?;
@@ -81,7 +85,7 @@ fn read_sweep_folder<'py>(
             Err(argument_error(
                 &folder.display().to_string(),
                 cause,
-                "a sweep has results and timings",
+                "a sweep has results, timings and series",
             ))
         }
         None => Ok(dict),

@@ -13,12 +13,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 use serde_json::json;
 use sidestep::experiment::sweep::{
-    BaselineSpec, Factor, Outcome, Plan, Precision, RunColumn, Setting, Sweep, SweepOverrides,
-    Trial,
+    BaselineSpec, Factor, Outcome, Plan, Precision, RunColumn, SeriesBand, Setting, Sweep,
+    SweepOverrides, Trial, series_bands,
 };
+use sidestep::kernel::ports::{ColumnSpec, ColumnValues, TableSchema};
 use sidestep::kernel::workers::available_workers;
 use sidestep::kernel::{InputError, Interrupt};
 use sidestep::scenario::{ResolvedScenario, Source};
+use sidestep::statistics::Interval;
 use sidestep::worlds::airspace::scenario::CompiledAirspace;
 use sidestep::worlds::airspace::settings::BuiltInMethod;
 use sidestep_papers::methods;
@@ -148,6 +150,9 @@ fn parse_any(of: &Bound<'_, PyAny>) -> PyResult<(Sweep, Option<Arc<LoadedScenari
 struct SweepResult {
     results: Vec<RunColumn>,
     timings: Vec<RunColumn>,
+    /// Metrics over time by run and cycle, and their means over the runs of each variant.
+    series: Vec<RunColumn>,
+    bands: Vec<SeriesBand>,
     /// The same JSON as that of `sidestep sweep --json`.
     summary: serde_json::Value,
     world: String,
@@ -181,6 +186,8 @@ fn sweep_result(
     Ok(SweepResult {
         results: done.table.results().into_iter().cloned().collect(),
         timings: done.table.timings().into_iter().cloned().collect(),
+        series: done.series.columns.clone(),
+        bands: series_bands(&done.table, &done.series),
         summary: done.to_json(plan, folder, &summary),
         world: plan.world.clone(),
     })
@@ -296,11 +303,50 @@ pub(crate) fn run_sweep<'py>(
     let result = result.map_err(|e| error::session_error(&e))?;
     let results = Table::from_runs("results", result.results, &result.world)?;
     let timings = Table::from_runs("timings", result.timings, &result.world)?;
+    let series = Table::from_runs("series", result.series, &result.world)?;
     Fields::new(py)
         .with("results", results)?
         .with("timings", timings)?
+        .with("series", series)?
+        .with("bands", bands_table(&result.bands)?)?
         .with("output", to_python(py, &result.summary)?)?
         .build(ResultClass("sidestep._sweep", "Sweep"))
+}
+
+/// Returns the means of metrics over time as a table, one row for each variant, metric and cycle.
+fn bands_table(bands: &[SeriesBand]) -> PyResult<Table> {
+    let rows = || bands.iter().flat_map(|band| band.points.iter().map(move |point| (band, point)));
+    let bound = |of: fn(Interval) -> f64| {
+        ColumnValues::F64(rows().map(|(_, point)| point.interval.map(of)).collect())
+    };
+    let metrics = rows().map(|(band, _)| Some(band.metric.clone()));
+    let columns = [
+        ("variant", "Number of the variant.", integers(rows().map(|(band, _)| band.variant.into()))),
+        ("metric", "Name of the metric.", ColumnValues::Text(metrics.collect())),
+        ("cycle", "Number of cycles done.", integers(rows().map(|(_, point)| point.cycle))),
+        (
+            "runs",
+            "Number of runs in which the metric has a value.",
+            integers(rows().map(|(_, point)| point.runs as u64)),
+        ),
+        (
+            "mean",
+            "Mean over these runs.",
+            ColumnValues::F64(rows().map(|(_, point)| Some(point.mean)).collect()),
+        ),
+        ("mean_low", "Lower end of the 95 % interval of the mean.", bound(|ends| ends.low)),
+        ("mean_high", "Upper end of the 95 % interval of the mean.", bound(|ends| ends.high)),
+    ];
+    let spec = |(name, meaning, values): &(&str, &str, ColumnValues)| ColumnSpec {
+        is_nullable: true,
+        ..ColumnSpec::new(name, values.column_type(), meaning)
+    };
+    let schema = TableSchema::new("bands", columns.iter().map(spec).collect());
+    Table::new(schema, columns.into_iter().map(|(_, _, values)| values).collect())
+}
+
+fn integers(values: impl Iterator<Item = u64>) -> ColumnValues {
+    ColumnValues::I64(values.map(|value| Some(value as i64)).collect())
 }
 
 /// Runs some trials of a sweep that another process drives, and returns their outcomes as JSON: the function that

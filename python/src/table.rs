@@ -221,6 +221,8 @@ fn column_description(column: &RunColumn, infos: &[MetricInfo]) -> String {
         Role::Metric => metric_label(infos, &column.name).meaning,
         Role::Digest => "Digest of the last state.",
         Role::Cost => "A time that the run took; it differs when the run is made again.",
+        Role::Cycle => "Number of cycles done before the row.",
+        Role::Series => metric_label(infos, &column.name).meaning,
     };
     description.to_string()
 }

@@ -215,6 +215,7 @@ pub(crate) fn outcome_from_values(trial: &Trial, values: Value) -> Outcome {
         failure: None,
         metrics,
         costs: Map::new(),
+        series: Map::new(),
     }
 }
 

@@ -78,7 +78,12 @@ pub(super) fn for_each_field(outcome: &Outcome, mut each: impl FnMut(Role, &str,
             each(Role::Metric, CYCLES, &outcome.cycles.into(), 1);
         }
     }
-    for (role, fields) in [(Role::Metric, &outcome.metrics), (Role::Cost, &outcome.costs)] {
+    let tables = [
+        (Role::Metric, &outcome.metrics),
+        (Role::Cost, &outcome.costs),
+        (Role::Series, &outcome.series),
+    ];
+    for (role, fields) in tables {
         for (place, (name, value)) in fields.iter().enumerate() {
             each(role, name, value, place + 2);
         }

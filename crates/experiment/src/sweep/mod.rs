@@ -8,6 +8,7 @@
 //! baseline.rs  the variant that each is compared with, within the other factors
 //! plan.rs      variants x replicates -> trials, and shares of them
 //! trial.rs     one trial -> one outcome: a deterministic run, so a lost one is simply run again
+//! series.rs    metrics over time of the runs, and their means over seeds
 //! seeds.rs     variants in which seeds change nothing
 //! scheduler.rs trials -> results, many at once
 //! rounds.rs    the next trials, if a requested precision decides when to stop
@@ -47,6 +48,7 @@ pub mod rounds;
 pub mod rows;
 pub mod scheduler;
 pub mod seeds;
+pub mod series;
 mod summarize;
 pub mod summary;
 pub mod table;
@@ -65,6 +67,7 @@ pub use options::{BaselineChoice, SummaryOptions};
 pub use overrides::SweepOverrides;
 pub use plan::{PRIVILEGE_MARK, Plan, Shard, Trial};
 pub use rows::RunTableBuilder;
+pub use series::{BandPoint, SeriesBand, series_bands};
 pub use summary::{OmittedMetric, Summary};
 pub use table::{Role, RunColumn, RunTable};
 pub use trial::{Outcome, TrialRun, start_trial};

@@ -48,6 +48,10 @@ pub struct Plan {
 /// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
 const MAX_SWEEP_RUNS: u64 = 10_000_000;
 
+/// The largest number of runs of a sweep whose metrics over time are kept: some 3 KB each, as much as all else of a run,
+/// and means over so many runs need no more.
+const MAX_SERIES_RUNS: u64 = 20_000;
+
 /// The end of the name of a variant in which somebody knows what no agent could.
 pub const PRIVILEGE_MARK: &str = " *";
 /// Most variants that the note on privileged ones lists by name.
@@ -114,6 +118,11 @@ impl Plan {
         };
         plan.baseline = plan.baseline_of(sweep, base)?;
         Ok(plan)
+    }
+
+    /// Returns whether metrics over time of its runs are kept.
+    pub fn keeps_series(&self) -> bool {
+        self.runs() <= MAX_SERIES_RUNS
     }
 
     /// Returns the baseline that is asked for, among the plan's variants.

@@ -162,9 +162,10 @@ impl RunTableBuilder {
 }
 
 impl RunTable {
-    /// Returns the columns without the times that runs took: it is the same when runs are made again.
+    /// Returns the columns without metrics over time and the times that runs took: it is the same when runs are made again.
     pub fn results(&self) -> Vec<&RunColumn> {
-        self.columns.iter().filter(|c| c.role != Role::Cost).collect()
+        let is_elsewhere = |role| matches!(role, Role::Cost | Role::Series);
+        self.columns.iter().filter(|c| !is_elsewhere(c.role)).collect()
     }
 
     /// Returns the times that each run took.
@@ -187,6 +188,7 @@ impl RunTable {
                 failure: failures.map(|c| c.values.text(row)).filter(|why| !why.is_empty()),
                 metrics: self.fields(Role::Metric, row),
                 costs: self.fields(Role::Cost, row),
+                series: self.fields(Role::Series, row),
             });
         }
     }
@@ -327,7 +329,7 @@ mod tests {
         metrics.insert("none".into(), Value::Null);
         let costs = [("run_wall_s".to_string(), json!(0.25))].into_iter().collect();
         let digest = format!("digest {trial}");
-        Outcome { trial, cycles: 10, digest, failure: None, metrics, costs }
+        Outcome { trial, cycles: 10, digest, failure: None, metrics, costs, series: Map::new() }
     }
 
     fn table(trials: impl IntoIterator<Item = u64>) -> RunTable {

@@ -25,6 +25,10 @@ pub enum Role {
     Digest,
     /// A time that the run took: it differs when the run is made again.
     Cost,
+    /// The number of cycles done before a row of metrics over time.
+    Cycle,
+    /// A metric over time: in the table of runs as text, in one of its own a number for each run and cycle.
+    Series,
 }
 
 /// A column of a table of runs; the name of a parameter is the path of its key.

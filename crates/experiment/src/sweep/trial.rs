@@ -1,6 +1,7 @@
 //! One trial -> one row.
 
 use super::plan::Trial;
+use super::series::TrialSeries;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use sidestep_kernel::series::is_clock_metric;
@@ -28,6 +29,9 @@ pub struct Outcome {
     pub metrics: Map<String, Value>,
     /// The times that it took, by dotted name, in seconds; they differ when it is run again.
     pub costs: Map<String, Value>,
+    /// Metrics over time, and the cycles at which they were kept, as [`series`](super::series) writes them.
+    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    pub series: Map<String, Value>,
 }
 
 /// The simulation of a trial, at its start.
@@ -35,6 +39,7 @@ pub struct TrialRun {
     trial: Trial,
     simulation: Box<dyn Simulation>,
     until: Cycle,
+    series: TrialSeries,
 }
 
 /// Returns the simulation of a trial of the variant `source`, of one of `worlds`, at its start.
@@ -50,7 +55,15 @@ pub fn start_trial(
     let source = source.clone().with_overrides(&[format!("seed={}", trial.seed)])?;
     let compiled = worlds.compile(&source)?;
     let until = compiled.plan().cycles;
-    Ok(TrialRun { trial, simulation: compiled.start(&source, workers), until })
+    let mut simulation = compiled.start(&source, workers);
+    let metrics = chart_metrics(worlds, compiled.world());
+    let series = TrialSeries::start(simulation.as_mut(), until, metrics);
+    Ok(TrialRun { trial, simulation, until, series })
+}
+
+/// Returns the metrics that a world is about.
+pub fn chart_metrics(worlds: &Worlds, world: &str) -> &'static [&'static str] {
+    worlds.find(world).map_or(&[], |world_type| world_type.chart_metrics())
 }
 
 /// Returns the names of the metrics that runs of a scenario have, in order.
@@ -77,7 +90,8 @@ impl TrialRun {
             }
             simulation.advance(INTERRUPT_CHECK_CYCLES.min(self.until - simulation.cycle()));
         }
-        Some(Outcome::from_simulation(self.trial, simulation))
+        let series = self.series.take(simulation);
+        Some(Outcome { series, ..Outcome::from_simulation(self.trial, simulation) })
     }
 }
 
@@ -94,6 +108,7 @@ impl Outcome {
             failure: None,
             metrics,
             costs,
+            series: Map::new(),
         }
     }
 
@@ -106,6 +121,7 @@ impl Outcome {
             failure: Some(why.into()),
             metrics: Map::new(),
             costs: Map::new(),
+            series: Map::new(),
         }
     }
 }

@@ -42,9 +42,14 @@ impl SeriesInterval {
 
     /// Returns the interval that gives a run of so many cycles some thousand rows.
     pub fn from_planned_cycles(planned: Cycle) -> Self {
+        Self::with_rows(planned, ROWS)
+    }
+
+    /// Returns the interval that gives a run of so many cycles this number of rows, at most.
+    pub fn with_rows(planned: Cycle, rows: Cycle) -> Self {
         let bounded = if planned <= MAX_PLANNED_CYCLES { planned } else { 0 };
-        let every = bounded.div_ceil(ROWS).max(1);
-        Self { every, span: every * ROWS }
+        let every = bounded.div_ceil(rows.max(1)).max(1);
+        Self { every, span: every.saturating_mul(rows.max(1)) }
     }
 
     /// Returns a fixed interval, which never doubles; 0 for no rows.

@@ -8,7 +8,7 @@ use serde_json::Value;
 use sidestep_kernel::InputError;
 
 use super::folder::{CELLS, RESULTS_STEM, RUNS, SHARES, SweepFolder, TEMP_FOLDER, VARIANTS};
-use super::results::{RESULTS, TIMINGS};
+use super::results::{RESULTS, SERIES, TIMINGS};
 use crate::disk;
 use crate::file_manifest::FileManifest;
 use crate::read::unreadable;
@@ -36,7 +36,9 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
             all.push((list.clone(), FileManifest::read(&list).map(drop)));
         }
         if list.exists() || self.is_complete() {
-            for name in [TIMINGS, RESULTS] {
+            let has_series = self.has_series();
+            let tables = [TIMINGS, SERIES, RESULTS];
+            for name in tables.into_iter().filter(|name| *name != SERIES || has_series) {
                 let table = self.path().join(name);
                 let checked = self.check_listed(&table).and_then(|()| check_rows(&table));
                 all.push((table, checked));
@@ -88,7 +90,7 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     pub(crate) fn is_remains(name: &str) -> bool {
         let whole = name.strip_suffix(".partial").unwrap_or(name);
         let is_share = name.starts_with(SHARES) && (whole != name || name.ends_with(".lock"));
-        let is_table = [CELLS, RESULTS, TIMINGS].contains(&whole);
+        let is_table = [CELLS, RESULTS, TIMINGS, SERIES].contains(&whole);
         let is_folder = [SHARES, VARIANTS, RUNS, TEMP_FOLDER].contains(&name);
         is_share
             || is_table

@@ -24,7 +24,8 @@ use crate::staging::StagingFolder;
 
 pub(super) const CELLS: &str = "cells.parquet";
 pub(super) const RESULTS_STEM: &str = "results";
-pub(super) const TIMINGS_STEM: &str = "timings";
+/// The tables that are listed with the results.
+const RESULT_STEMS: [&str; 3] = ["results", "timings", "series"];
 pub(super) const SHARES: &str = "shares";
 pub(super) const VARIANTS: &str = "variants";
 pub(super) const RUNS: &str = "runs";
@@ -185,8 +186,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Checks a file against the digest in `STEM.manifest.json` beside it. Folders of older versions have no such list.
     pub(super) fn check_listed(&self, file: &Path) -> Result<(), InputError> {
         let (Some(name), Some(stem)) = (file.file_name(), file.file_stem()) else { return Ok(()) };
-        let stem =
-            if stem == TIMINGS_STEM { RESULTS_STEM } else { stem.to_str().unwrap_or_default() };
+        let stem = stem.to_str().unwrap_or_default();
+        let stem = if RESULT_STEMS.contains(&stem) { RESULTS_STEM } else { stem };
         let list = file.with_file_name(FileManifest::name_for(stem));
         if self.seal == Seal::Missing && !list.exists() {
             return Ok(());

@@ -1,4 +1,4 @@
-//! The tables of a sweep that is done: of its runs, and of the times that they took.
+//! The tables of a sweep that is done: of its runs, of the times that they took, and of their metrics over time.
 
 use std::path::{Path, PathBuf};
 
@@ -14,65 +14,103 @@ use crate::run_table::{self, LoadedTable, TableStream};
 
 pub(super) const RESULTS: &str = "results.parquet";
 pub(super) const TIMINGS: &str = "timings.parquet";
+pub(super) const SERIES: &str = "series.parquet";
 /// Key of the plan in the key-value pairs of a table.
 const PLAN: &str = "sidestep.plan";
 
-/// The table of runs, and that of the times that they took, while they are written.
+/// Columns of the tables of some runs.
+#[derive(Debug)]
+pub struct ResultColumns<'a, R> {
+    /// The columns of the table of runs.
+    pub results: &'a [&'a ColumnWithRole<R>],
+    /// Those of the times that they took.
+    pub timings: &'a [&'a ColumnWithRole<R>],
+    /// Those of their metrics over time; without columns there is no such table.
+    pub series: &'a [&'a ColumnWithRole<R>],
+}
+
+/// The table of runs, that of the times that they took, and that of their metrics over time, while they are written.
 pub struct ResultsWriter {
     results: TableStream,
     timings: TableStream,
-    /// The path of the list of both.
+    series: Option<TableStream>,
+    /// The path of the list of all.
     manifest: PathBuf,
     program_version: String,
 }
 
 impl ResultsWriter {
-    /// Appends runs to both.
+    /// Appends runs to all tables.
     ///
     /// # Errors
     /// Columns other than those it was started with; an I/O error.
-    pub fn append<R>(
-        &mut self,
-        results: &[&ColumnWithRole<R>],
-        timings: &[&ColumnWithRole<R>],
-    ) -> Result<(), RecordError> {
-        self.results.append(results)?;
-        self.timings.append(timings)
+    pub fn append<R>(&mut self, columns: &ResultColumns<'_, R>) -> Result<(), RecordError> {
+        self.results.append(columns.results)?;
+        if let Some(series) = &mut self.series {
+            series.append(columns.series)?;
+        }
+        self.timings.append(columns.timings)
     }
 
-    /// Completes both. Their digests come first, because the sweep is done once the results exist, and the table of
-    /// timings before the results for the same reason.
+    /// Completes all. Their digests come first, because the sweep is done once the results exist, and the other tables
+    /// before the results for the same reason.
     ///
     /// # Errors
     /// An I/O error.
     pub fn finish(mut self) -> Result<(), RecordError> {
         let mut list = FileManifest::new("table", &self.program_version);
         list.files.insert(TIMINGS, self.timings.close()?);
+        if let Some(series) = &mut self.series {
+            list.files.insert(SERIES, series.close()?);
+        }
         list.files.insert(RESULTS, self.results.close()?);
         list.write(&self.manifest)?;
         self.timings.finish()?;
+        self.series.map_or(Ok(()), TableStream::finish)?;
         self.results.finish()
     }
 }
 
 impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
-    /// Begins the table of runs, with columns of these names, roles and types, and that of their times.
+    /// Begins the tables, with columns of these names, roles and types.
     ///
     /// # Errors
     /// An I/O error.
     pub fn results_writer<R: Serialize>(
         &self,
-        results: &[&ColumnWithRole<R>],
-        timings: &[&ColumnWithRole<R>],
+        columns: &ResultColumns<'_, R>,
     ) -> Result<ResultsWriter, RecordError> {
         let plan = serde_json::to_string(self.plan())
             .map_err(|e| RecordError::new(self.path().display(), e))?;
         let extra = [(PLAN, plan), (FINGERPRINT, self.fingerprint())];
         let version = &self.manifest().program_version;
-        let timings = TableStream::create(&self.path().join(TIMINGS), timings, version, &extra)?;
-        let results = TableStream::create(&self.path().join(RESULTS), results, version, &extra)?;
+        let create = |name: &str, columns: &[&ColumnWithRole<R>]| {
+            TableStream::create(&self.path().join(name), columns, version, &extra)
+        };
+        let timings = create(TIMINGS, columns.timings)?;
+        let has_series = !columns.series.is_empty();
+        let series = has_series.then(|| create(SERIES, columns.series)).transpose()?;
+        let results = create(RESULTS, columns.results)?;
         let manifest = self.path().join(FileManifest::name_for(RESULTS_STEM));
-        Ok(ResultsWriter { timings, results, manifest, program_version: version.clone() })
+        let program_version = version.clone();
+        Ok(ResultsWriter { timings, series, results, manifest, program_version })
+    }
+
+    /// Returns whether metrics over time of the runs are kept: a sweep with very many runs has none.
+    pub fn has_series(&self) -> bool {
+        let list = self.path().join(FileManifest::name_for(RESULTS_STEM));
+        let is_listed = FileManifest::read(&list).is_ok_and(|(list, _)| list.files.contains(SERIES));
+        is_listed || self.path().join(SERIES).exists()
+    }
+
+    /// Reads the table of the metrics over time; none of a sweep without them.
+    ///
+    /// # Errors
+    /// A table that is missing though it is listed, damaged, or of another sweep.
+    pub fn series<R: DeserializeOwned + Clone>(
+        &self,
+    ) -> Result<Option<LoadedTable<R>>, InputError> {
+        self.has_series().then(|| self.table(SERIES)).transpose()
     }
 
     /// Returns whether the table of all runs exists.

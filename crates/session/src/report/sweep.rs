@@ -27,7 +27,7 @@ pub(super) fn document(
     folder: &Folder,
     watcher: &dyn Watcher,
 ) -> Result<Document, Error> {
-    let FinishedRuns { table, is_complete } = read_finished(folder)?;
+    let FinishedRuns { table, is_complete, .. } = read_finished(folder)?;
     // Its text is shown.
     folder.check_variant(0)?;
     let plan = folder.plan();

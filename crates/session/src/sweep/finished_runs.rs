@@ -15,6 +15,8 @@ use std::path::Path;
 pub struct FinishedRuns {
     /// One row per run, with the times that it took.
     pub table: RunTable,
+    /// Their metrics over time, one row per run and cycle; without columns where none were kept.
+    pub series: RunTable,
     /// Whether these are all planned runs.
     pub is_complete: bool,
 }
@@ -33,7 +35,8 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
                 table.columns.push(cost);
             }
         }
-        return Ok(FinishedRuns { table, is_complete: true });
+        let series = read_series(folder)?;
+        return Ok(FinishedRuns { table, series, is_complete: true });
     }
     let mut rows = RunTableBuilder::default();
     for_each_outcome(folder, None, |outcome| rows.push(&outcome))?;
@@ -41,7 +44,13 @@ pub fn read_finished(folder: &Folder) -> Result<FinishedRuns, InputError> {
         let remedy = format!("run it first: `{}`", sidestep_command("resume", folder.path()));
         return Err(InputError::new(folder.path().display(), "no run is finished yet", remedy));
     }
-    Ok(FinishedRuns { table: rows.build(folder.plan())?, is_complete: false })
+    let (table, series) = rows.build(folder.plan())?.split_series();
+    Ok(FinishedRuns { table, series, is_complete: false })
+}
+
+/// Returns the metrics over time of a sweep that is done; without columns where none were kept.
+pub(super) fn read_series(folder: &Folder) -> Result<RunTable, InputError> {
+    Ok(folder.series()?.map(to_run_table).unwrap_or_default())
 }
 
 /// Returns the picture of the run of a trial that ended with `digest`, as SVG: from its run folder, or from a repeated

@@ -2,7 +2,7 @@
 
 use super::buckets::{BUCKET_TRIALS, OutcomeBuckets};
 use super::executor::Engine;
-use super::finished_runs::read_finished;
+use super::finished_runs::{FinishedRuns, read_finished, read_series};
 use super::folder::{Folder, check_build, for_each_outcome, to_run_table, to_share};
 use super::journal::TimestampedOutcome;
 use super::prepare::{VariantFn, prepare};
@@ -11,6 +11,7 @@ use super::trial_runner::{OutcomeHandler, TrialRunner};
 use crate::VERSION;
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
+use serde_json::Map;
 use sidestep_experiment::sweep::rounds::Rounds;
 use sidestep_experiment::sweep::seeds::PilotRuns;
 use sidestep_experiment::sweep::{
@@ -19,8 +20,9 @@ use sidestep_experiment::sweep::{
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::RecordError;
 use sidestep_kernel::shell::sidestep_command;
-use sidestep_record::sweep::{ResultsWriter, fingerprint};
+use sidestep_record::sweep::{ResultColumns, ResultsWriter, fingerprint};
 use sidestep_scenario::{ResolvedScenario, Source, Worlds};
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,6 +39,8 @@ pub enum SweepEnd {
 pub struct SweepResult {
     /// One row per run.
     pub table: RunTable,
+    /// Their metrics over time, one row per run and cycle; without columns where none were kept.
+    pub series: RunTable,
     /// The time that they took in this process.
     pub effort: SweepTiming,
     /// Whether all were already finished before.
@@ -44,12 +48,24 @@ pub struct SweepResult {
 }
 
 impl SweepResult {
+    /// Returns the result of runs that are finished now, with their metrics over time in the table.
     fn complete(table: RunTable, effort: SweepTiming) -> SweepEnd {
-        SweepEnd::Done(Self { table, effort, was_done: false })
+        let (table, series) = table.split_series();
+        SweepEnd::Done(Self { table, series, effort, was_done: false })
     }
 
+    /// Returns the same of runs that were finished before.
     fn already_complete(table: RunTable) -> SweepEnd {
-        SweepEnd::Done(Self { table, effort: SweepTiming::default(), was_done: true })
+        let (table, series) = table.split_series();
+        SweepEnd::Done(Self { table, series, effort: SweepTiming::default(), was_done: true })
+    }
+
+    /// Reads the results of a folder that is done.
+    fn read(folder: &Folder) -> Result<SweepEnd, Error> {
+        let table = to_run_table(folder.results()?);
+        let series = read_series(folder)?;
+        let effort = SweepTiming::default();
+        Ok(SweepEnd::Done(Self { table, series, effort, was_done: true }))
     }
 }
 
@@ -75,8 +91,9 @@ pub fn run_in_memory<'a>(
     let runner = TrialRunner { worlds, agents, source: &source, record: None, engine, watcher };
     let mut scheduler = TrialScheduler::new(&plan);
     let mut rows = RunTableBuilder::default();
+    let keeps_series = plan.keeps_series();
     let effort = scheduler.run_all(&runner, &mut |outcome| {
-        rows.push(outcome);
+        rows.push(&kept_outcome(outcome, keeps_series));
         Ok(())
     })?;
     let end = if watcher.should_continue() {
@@ -164,9 +181,10 @@ pub fn run_remaining<'a>(
     watcher: &dyn Watcher,
 ) -> Result<SweepEnd, Error> {
     if folder.is_complete() {
-        return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
+        return SweepResult::read(folder);
     }
     check_build(worlds, folder)?;
+    let keeps_series = folder.plan().keeps_series();
     let mut scheduler = TrialScheduler::new(folder.plan());
     // The journal of this share is read when it is locked, below: until then another process may append to it.
     for_each_outcome(folder, Some(Shard::ALL), |outcome| scheduler.record(&outcome))?;
@@ -179,7 +197,8 @@ pub fn run_remaining<'a>(
         with_trial_runner(worlds, folder, engine.into(), watcher, |runner| {
             effort = scheduler
                 .run_all(runner, &mut |outcome| {
-                    Ok(journal.append(&TimestampedOutcome::now(outcome))?)
+                    let kept = kept_outcome(outcome, keeps_series);
+                    Ok(journal.append(&TimestampedOutcome::now(&kept))?)
                 })
                 .map_err(|e| with_resume_hint(e, folder.path()))?;
             Ok(())
@@ -219,14 +238,18 @@ fn join_blocks(
     let planned = folder.plan().len().max(1) as f64;
     let mut written = 0;
     buckets.for_each_block(|block| {
-        let results = block.results();
-        let timings = block.timings();
+        let series = block.series();
+        let columns = ResultColumns {
+            results: &block.results(),
+            timings: &block.timings(),
+            series: &series.columns.iter().collect::<Vec<_>>(),
+        };
         let writer = match &mut writer {
             Some(writer) => writer,
             // All blocks have the columns of the first one, so they are known from it.
-            None => writer.insert(folder.results_writer(&results, &timings)?),
+            None => writer.insert(folder.results_writer(&columns)?),
         };
-        writer.append(&results, &timings)?;
+        writer.append(&columns)?;
         written += block.runs();
         let share = 0.5 + 0.5 * (written as f64 / planned).min(1.0);
         watched.report(Progress::Stage { what: "writing the results", share });
@@ -237,11 +260,13 @@ fn join_blocks(
         writer.finish()?;
     }
     // A table of several blocks is read again once the data that joined them is out of memory.
-    let table = match only_block {
-        Some(table) => table,
-        None => read_finished(folder)?.table,
-    };
-    Ok(SweepResult::complete(table, effort))
+    match only_block {
+        Some(table) => Ok(SweepResult::complete(table, effort)),
+        None => {
+            let FinishedRuns { table, series, .. } = read_finished(folder)?;
+            Ok(SweepEnd::Done(SweepResult { table, series, effort, was_done: false }))
+        }
+    }
 }
 
 /// Runs one share of the trials and writes its part.
@@ -258,6 +283,7 @@ pub fn run_share(
     check_build(worlds, folder)?;
     refuse_precision(folder)?;
     let plan = folder.plan();
+    let keeps_series = plan.keeps_series();
     if folder.is_complete() {
         return Ok(SweepResult::already_complete(finished_in_share(folder, shard)?));
     }
@@ -281,8 +307,9 @@ pub fn run_share(
     with_trial_runner(worlds, folder, workers.into(), watcher, |runner| {
         effort = scheduler
             .run(runner, &trials, &mut |outcome| {
-                journal.append(&TimestampedOutcome::now(outcome))?;
-                rows.push(outcome);
+                let kept = kept_outcome(outcome, keeps_series);
+                journal.append(&TimestampedOutcome::now(&kept))?;
+                rows.push(&kept);
                 Ok(())
             })
             .map_err(|e| with_resume_hint(e, folder.path()))?;
@@ -333,7 +360,7 @@ fn finished_in_share(folder: &Folder, shard: Shard) -> Result<RunTable, Error> {
 /// When runs are missing, cannot be read or stored, or are of another build.
 pub fn collect(worlds: &Worlds, folder: &Folder, watcher: &dyn Watcher) -> Result<SweepEnd, Error> {
     if folder.is_complete() {
-        return Ok(SweepResult::already_complete(to_run_table(folder.results()?)));
+        return SweepResult::read(folder);
     }
     check_build(worlds, folder)?;
     let plan = folder.plan();
@@ -355,6 +382,14 @@ pub fn collect(worlds: &Worlds, folder: &Folder, watcher: &dyn Watcher) -> Resul
         return Err(Error::other(cause, remedy));
     }
     join_runs(folder, BUCKET_TRIALS, SweepTiming::default(), watcher)
+}
+
+/// Returns an outcome without its metrics over time where the sweep has too many runs to keep them.
+fn kept_outcome(outcome: &Outcome, keeps_series: bool) -> Cow<'_, Outcome> {
+    if keeps_series || outcome.series.is_empty() {
+        return Cow::Borrowed(outcome);
+    }
+    Cow::Owned(Outcome { series: Map::new(), ..outcome.clone() })
 }
 
 /// Passes on everything needed to run the trials of a folder.

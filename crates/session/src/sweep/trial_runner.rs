@@ -7,6 +7,8 @@ use crate::watcher::{NestedWatcher, Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use serde_json::json;
 use sidestep_experiment::sweep::scheduler::{self, run_trials};
+use sidestep_experiment::sweep::series::TrialSeries;
+use sidestep_experiment::sweep::trial::chart_metrics;
 use sidestep_experiment::sweep::{Outcome, Trial, start_trial};
 use sidestep_kernel::InputError;
 use sidestep_record::{CycleOrigin, IfExists};
@@ -183,12 +185,16 @@ impl RecordedTrial<'_> {
         };
         let recording =
             RunRecorder::create(folder, &resolved, run.as_mut(), plan).map_err(folder_error)?;
+        let until = run.config().cycles;
+        let metrics = chart_metrics(worlds, compiled.world());
+        let series = TrialSeries::start(run.as_mut(), until, metrics);
         let compiled_at = Instant::now();
         let is_complete = record_to_end(run.as_mut(), recording, workers, &NestedWatcher(watcher))?;
         if !is_complete {
             return Ok(None);
         }
-        let outcome = Outcome::from_simulation(trial, run.as_ref());
+        let series = series.take(run.as_mut());
+        let outcome = Outcome { series, ..Outcome::from_simulation(trial, run.as_ref()) };
         Ok(Some(with_times(outcome, [compiled_at - started_at, compiled_at.elapsed()])))
     }
 }

@@ -90,25 +90,26 @@ fn tables_and_shares_of_another_sweep_are_refused() {
     let columns = cells();
     let refs: Vec<_> = columns.iter().collect();
     let complete = |folder: &Folder| {
-        let mut completion = folder.results_writer(&refs, &refs).unwrap();
-        completion.append(&refs, &refs).unwrap();
+        let tables = ResultColumns { results: &refs, timings: &refs, series: &refs };
+        let mut completion = folder.results_writer(&tables).unwrap();
+        completion.append(&tables).unwrap();
         completion.finish().unwrap();
     };
     complete(&own);
     for other in [other("plan", vec![4], "f"), other("scenarios", vec![4, 5], "g")] {
         complete(&other);
-        for table in ["results.parquet", "timings.parquet"] {
+        for table in ["results.parquet", "timings.parquet", "series.parquet"] {
             let file = own.path().join(table);
             let before = fs::read(&file).unwrap();
             fs::copy(other.path().join(table), &file).unwrap();
-            let refused = own.results::<String>().and_then(|_| own.timings::<String>());
+            let refused = own.results::<String>().and_then(|_| own.timings::<String>()).and_then(|_| own.series::<String>());
             let refused = refused.unwrap_err();
             assert!(refused.cause().contains("another sweep"), "{refused}");
             assert!(refused.remedy().contains("delete `results.parquet`"), "{refused}");
             fs::write(&file, before).unwrap();
         }
     }
-    own.results::<String>().and_then(|_| own.timings::<String>()).unwrap();
+    own.results::<String>().and_then(|_| own.timings::<String>()).and_then(|_| own.series::<String>()).unwrap();
     let (other, share) = (other("share", vec![4, 5], "g"), Share { index: 0, count: 1 });
     let journal = other.journal(share, |_: u32| ()).unwrap().unwrap();
     other.finish_share(share, journal, &refs).unwrap();
