@@ -79,6 +79,10 @@ impl WorldType for Pond {
          [pond]\nfrogs = 12\nwidth = 8\nheight = 6\ncheckpoint_every = 500\n"
     }
 
+    fn chart_metrics(&self) -> &'static [&'static str] {
+        &["hops"]
+    }
+
     fn kinds(&self) -> &'static [BodyKind] {
         super::kinds::ALL
     }

@@ -564,7 +564,12 @@ mod tests {
         }
         let costs = serde_json::Map::from_iter([("run_wall_s".to_string(), json!(0.25))]);
         let (digest, failure) = (format!("end {}", trial.id), None);
-        Outcome { metrics, costs, digest, failure, cycles: 7, ..Outcome::from_failure(trial, "") }
+        let series = serde_json::Map::from_iter([
+            ("cycle".to_string(), json!("3,6")),
+            ("arrived".to_string(), json!(format!("{},", trial.id))),
+        ]);
+        let from = Outcome::from_failure(trial, "");
+        Outcome { metrics, costs, digest, failure, series, cycles: 7, ..from }
     }
 
     #[test]
@@ -578,10 +583,11 @@ mod tests {
             let file = read_finished(&folder).expect("it is done");
             std::fs::remove_file(folder.results_file()).expect("there");
             assert_eq!(done.table, file.table, "{trials} trials at a time");
-            file.table
+            assert_eq!(done.series, file.series, "{trials} trials at a time");
+            (file.table, file.series)
         };
         let whole = tables(BUCKET_TRIALS);
-        assert_eq!(whole.runs(), 600);
+        assert_eq!((whole.0.runs(), whole.1.runs()), (600, 1200));
         for trials in [1000, 600, 599, 64, 7] {
             assert_eq!(tables(trials), whole, "{trials} trials at a time");
         }

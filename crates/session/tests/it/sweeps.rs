@@ -1,10 +1,11 @@
 //! Many runs of one scenario.
 
 use crate::support::{BUILD, TestFolder, WORLDS};
-use sidestep_experiment::sweep::{Outcome, RunTable, Shard, Sweep, Trial};
+use sidestep_experiment::sweep::{Outcome, RunTable, Shard, Sweep, Trial, series_bands};
+use sidestep_scenario::Source;
 use sidestep_session::report::document;
 use sidestep_session::sweep::{
-    Engine, Folder, OutcomeSink, SweepEnd, Task, TrialBatch, TrialExecutor, collect, create,
+    Engine, Folder, OutcomeSink, SweepEnd, SweepResult, Task, TrialBatch, TrialExecutor, collect, create,
     read_status, run_in_memory, run_remaining, run_share,
 };
 use sidestep_session::{Error, NoWatcher};
@@ -19,13 +20,58 @@ pub(crate) fn sweep(place: &TestFolder) -> Sweep {
     Sweep::read(&file).expect("valid")
 }
 
-fn done(ended: SweepEnd) -> RunTable {
+fn finished(ended: SweepEnd) -> SweepResult {
     match ended {
-        SweepEnd::Done(done) => {
-            RunTable { columns: done.table.results().into_iter().cloned().collect() }
-        }
+        SweepEnd::Done(done) => done,
         SweepEnd::Interrupted(runs) => panic!("interrupted after {runs} runs"),
     }
+}
+
+fn done(ended: SweepEnd) -> RunTable {
+    RunTable { columns: finished(ended).table.results().into_iter().cloned().collect() }
+}
+
+#[test]
+fn means_over_seeds_are_those_of_plain_runs_however_a_sweep_is_run() {
+    let place = TestFolder::new();
+    let sweep = sweep(&place);
+    let (_, ended) = run_in_memory(&WORLDS, &sweep, 2, &NoWatcher).expect("run");
+    let whole = finished(ended);
+    let folder = create(&WORLDS, &sweep, &place.path("s"), 2, &NoWatcher).expect("planned");
+    for shard in ["1/2", "0/2"] {
+        let shard: Shard = shard.parse().expect("a share");
+        run_share(&WORLDS, &folder, shard, 1, &NoWatcher).expect("run");
+    }
+    let collected = finished(collect(&WORLDS, &folder, &NoWatcher).expect("collected"));
+    assert!(whole.series == collected.series);
+    assert!(place.path("s/series.parquet").is_file());
+    let read = finished(run_remaining(&WORLDS, &folder, 1, &NoWatcher).expect("read"));
+    assert!(read.was_done && read.series == whole.series);
+
+    let recorded = Sweep { record: true, ..sweep.clone() };
+    let folder = create(&WORLDS, &recorded, &place.path("r"), 2, &NoWatcher).expect("planned");
+    let recorded = finished(run_remaining(&WORLDS, &folder, 2, &NoWatcher).expect("run"));
+    assert!(recorded.series == whole.series, "recorded or not");
+
+    let bands = series_bands(&whole.table, &whole.series);
+    assert_eq!(bands.len(), 2, "one metric of two variants");
+    for (band, frogs) in bands.iter().zip([4, 20]) {
+        assert_eq!(band.points.len(), 100);
+        for point in band.points.iter().step_by(33) {
+            let hops: Vec<f64> = (1..=3).map(|seed| hops(frogs, seed, point.cycle)).collect();
+            assert_eq!((point.runs, point.mean), (3, hops.iter().sum::<f64>() / 3.0));
+        }
+    }
+}
+
+/// Returns the hops of so many frogs in a run of so many cycles.
+fn hops(frogs: u32, seed: u64, cycles: u64) -> f64 {
+    let text = std::fs::read_to_string(TestFolder::new().path("pond.toml")).expect("a scenario");
+    let settings = [format!("pond.frogs={frogs}"), format!("seed={seed}")];
+    let source = Source::new("pond.toml", text, "").with_overrides(&settings).expect("keys");
+    let mut run = WORLDS.compile(&source).expect("valid").start(&source, 1);
+    while run.cycle() < cycles && run.advance(cycles - run.cycle()) > 0 {}
+    run.metrics()["hops"].as_f64().expect("a number")
 }
 
 #[test]
