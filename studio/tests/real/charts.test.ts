@@ -58,8 +58,8 @@ describe.skipIf(BINARY === "")("charts", () => {
 
   for (const [name, end] of [
     ["robots/crossing.toml", 1000],
-    ["chain/movers.toml", 200],
-    ["airspace/superconflict.toml", 150],
+    ["chain/arm.toml", 200],
+    ["airspace/superconflict.toml", 75],
   ] as const)
     test(`of ${name} equal the command's metrics at ${CYCLES} cycles`, { timeout: 300_000 }, async () => {
       const path = `${SCENARIOS}/${name}`;

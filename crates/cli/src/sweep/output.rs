@@ -201,7 +201,7 @@ pub(crate) fn print_share(
     end: SweepEnd,
 ) -> Result<ExitCode, Failure> {
     let console = output.console;
-    let SweepResult { table, effort, was_done } = match end {
+    let SweepResult { table, effort, was_done, .. } = match end {
         SweepEnd::Done(done) => done,
         SweepEnd::Interrupted(runs) => return print_interrupted(output, runs),
     };
