@@ -3,6 +3,7 @@
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { short } from "../format";
+import { isConstant } from "../rounding";
 
 export interface PlotColors {
   ink: string;
@@ -19,14 +20,10 @@ export interface PlotHooks {
   onClick(cycle: number): void;
 }
 
-/** A metric whose values differ by less than this share of them is constant: the rest is an error of rounding. */
-const ROUNDING = 1e-9;
-
 /** The range of an axis: round, with zero if it is near, and not empty for constant values. */
 function rangeOf(low: number | null, high: number | null): uPlot.Range.MinMax {
   if (low === null || high === null) return [0, 1];
-  if (high - low <= ROUNDING * Math.max(Math.abs(low), Math.abs(high)))
-    return low === 0 ? [0, 1] : [low - 0.5 * Math.abs(low), high + 0.5 * Math.abs(high)];
+  if (isConstant(low, high)) return low === 0 ? [0, 1] : [low - 0.5 * Math.abs(low), high + 0.5 * Math.abs(high)];
   return uPlot.rangeNum(low, high, 0.1, true);
 }
 

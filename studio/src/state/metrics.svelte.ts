@@ -1,6 +1,7 @@
 /** A session's metrics over time: exact values at cycles that the server has kept by their numbers. */
 
 import type { MetricName, MetricRow, ReplyBody } from "../protocol";
+import { isConstant } from "../rounding";
 
 type MetricsReply = Extract<ReplyBody, { is: "metrics" }>;
 
@@ -20,8 +21,6 @@ export class Metrics {
   present = $state.raw<MetricRow | null>(null);
   #isFetching = false;
   #age = 0;
-  /** The charts that were shown last without a choice. */
-  #shown: string[] = [];
 
   clear(): void {
     this.cycles = [];
@@ -32,20 +31,16 @@ export class Metrics {
   }
 
   /**
-   * The metrics to chart where nobody has chosen any: those that the world is about, and of these first the ones that
-   * have changed. A chart that shows something stays where it is.
+   * The metrics to chart where nobody has chosen any: the first of those that the world is about, and of these the ones
+   * that have changed where there are enough; in their own order, so that none changes its place.
    */
   defaultKeys(count: number): string[] {
-    const candidates = this.names.some((name) => name.is_primary)
-      ? this.names.filter((name) => name.is_primary)
-      : this.names;
-    const keys = candidates.map(({ key }) => key);
-    const changing = keys.filter((key) => this.#hasChanged(key));
-    const places = this.#shown.slice(0, count).map((key) => (changing.includes(key) ? key : null));
-    while (places.length < Math.min(count, keys.length)) places.push(null);
-    const rest = [...changing, ...keys].filter((key, i, all) => all.indexOf(key) === i && !places.includes(key));
-    this.#shown = places.map((key) => key ?? rest.shift()).filter((key) => key !== undefined);
-    return this.#shown;
+    const isTold = this.names.some((name) => name.is_primary);
+    const keys = this.names.filter((name) => name.is_primary || !isTold).map(({ key }) => key);
+    const changed = keys.filter((key) => this.#hasChanged(key));
+    const constant = keys.filter((key) => !changed.includes(key));
+    const chosen = [...changed, ...constant].slice(0, count);
+    return keys.filter((key) => chosen.includes(key));
   }
 
   /** The rows of a metric for a chart, with that of the present cycle in its place. */
@@ -96,10 +91,11 @@ export class Metrics {
     return this.names.findIndex((name) => name.key === key);
   }
 
-  /** Returns whether a metric has had two values, or has one since some cycle. */
+  /** Returns whether a metric has had two values that differ by more than rounding does. */
   #hasChanged(key: string): boolean {
-    const { values } = this.curve(key);
-    return values.some((value) => value !== null && value !== values[0]);
+    const values = this.curve(key).values.filter((value) => value !== null);
+    const [first = 0] = values;
+    return values.some((value) => !isConstant(Math.min(value, first), Math.max(value, first)));
   }
 }
 

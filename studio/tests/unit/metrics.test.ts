@@ -48,15 +48,27 @@ test("a value between two rows is that of the earlier one, with its cycle", asyn
   expect(new Metrics().valueAt("a", 9)).toBeNull();
 });
 
-test("charts show what the world is about and has changed, and keep their places", async () => {
+test("charts show what the world is about and has changed, in its order", async () => {
   const metrics = new Metrics();
   const primary = ["a", "b", "c"];
   await metrics.fetch(answered({ cycles: [0], values: [[0], [0], [0], [5]] }, primary));
   expect(metrics.defaultKeys(2)).toEqual(["a", "b"]);
   await metrics.fetch(answered({ first: 1, cycles: [10], values: [[0], [0], [4], [6]] }, primary));
-  expect(metrics.defaultKeys(2)).toEqual(["c", "a"]);
+  expect(metrics.defaultKeys(2)).toEqual(["a", "c"]);
   await metrics.fetch(answered({ first: 2, cycles: [20], values: [[1], [1], [4], [7]] }, primary));
-  expect(metrics.defaultKeys(2)).toEqual(["c", "a"]);
+  expect(metrics.defaultKeys(2)).toEqual(["a", "b"]);
+});
+
+test("an error of rounding is no change, and the first value is none either", async () => {
+  const metrics = new Metrics();
+  const values = [
+    [0, 0, 0],
+    [null, 0.02, 0.02 + 1e-17],
+    [0.5, 0.5000000000000219, 0.5],
+    [null, 3, 2],
+  ];
+  await metrics.fetch(answered({ cycles: [0, 1, 2], values }, ["a", "b", "c", "d"]));
+  expect(metrics.defaultKeys(2)).toEqual(["a", "d"]);
 });
 
 test("a world that names no metrics shows its first ones", async () => {
@@ -71,5 +83,5 @@ test("a world that names no metrics shows its first ones", async () => {
       ],
     }),
   );
-  expect(metrics.defaultKeys(2)).toEqual(["b", "a"]);
+  expect(metrics.defaultKeys(2)).toEqual(["a", "b"]);
 });
