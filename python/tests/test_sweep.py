@@ -122,6 +122,21 @@ def test_tables_are_arrow_streams_and_are_read_back_from_the_folder(floor, tmp_p
     assert list(sidestep.read(tmp_path / "s", ["timings"])) == ["timings"]
 
 
+def test_metrics_over_time_have_means_over_seeds_at_equal_cycles(floor, tmp_path):
+    swept = sidestep.sweep(floor, vary=VARY, replicate=3, out=tmp_path / "s")
+    series, bands = swept.series, swept.bands
+    assert sorted(set(series["cycle"]))[:2] == sorted(set(bands["cycle"]))[:2]
+    last = series["cycle"].max()
+    at_end = (series["cycle"] == last) & (series["variant"] == 1)
+    of_contacts = (bands["metric"] == "contacts") & (bands["cycle"] == last) & (bands["variant"] == 1)
+    assert bands["mean"][of_contacts].tolist() == [series["contacts"][at_end].mean()]
+    assert bands["mean_low"][of_contacts] <= bands["mean"][of_contacts]
+    assert bands["runs"][of_contacts].tolist() == [3]
+    np.testing.assert_array_equal(series["contacts"][at_end], swept.values("contacts", 1))
+    read = sidestep.read(tmp_path / "s")["series"]
+    np.testing.assert_array_equal(read["contacts"], series["contacts"])
+
+
 def test_methods_are_compared_as_the_command_compares_them(command, root):
     scenario = root / "scenarios/airspace/superconflict.toml"
     words = told(command, "compare", scenario, "--runs", 2, "--methods", "mvp,none")
