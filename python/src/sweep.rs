@@ -321,7 +321,11 @@ fn bands_table(bands: &[SeriesBand]) -> PyResult<Table> {
     };
     let metrics = rows().map(|(band, _)| Some(band.metric.clone()));
     let columns = [
-        ("variant", "Number of the variant.", integers(rows().map(|(band, _)| band.variant.into()))),
+        (
+            "variant",
+            "Number of the variant.",
+            integers(rows().map(|(band, _)| band.variant.into())),
+        ),
         ("metric", "Name of the metric.", ColumnValues::Text(metrics.collect())),
         ("cycle", "Number of cycles done.", integers(rows().map(|(_, point)| point.cycle))),
         (

@@ -23,10 +23,7 @@ pub(crate) struct MetricWords {
 
 impl MetricWords {
     pub(crate) fn from_world(world_type: &dyn WorldType) -> Self {
-        Self {
-            infos: world_type.metric_infos(),
-            chart_metrics: world_type.chart_metrics(),
-        }
+        Self { infos: world_type.metric_infos(), chart_metrics: world_type.chart_metrics() }
     }
 
     /// Returns the place of a metric among those that charts show first; those that they do not have the last.

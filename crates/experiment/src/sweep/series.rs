@@ -162,7 +162,12 @@ pub fn series_bands(runs: &RunTable, series: &RunTable) -> Vec<SeriesBand> {
             let points = cycles.iter().filter_map(|&cycle| {
                 let values: Vec<f64> = values(cycle).collect();
                 let mean = mean(&values)?;
-                Some(BandPoint { cycle, runs: values.len(), mean, interval: mean_interval(&values) })
+                Some(BandPoint {
+                    cycle,
+                    runs: values.len(),
+                    mean,
+                    interval: mean_interval(&values),
+                })
             });
             let points: Vec<BandPoint> = points.collect();
             bands.push(SeriesBand { variant: *variant, metric: column.name.clone(), points });

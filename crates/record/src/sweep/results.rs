@@ -99,7 +99,8 @@ impl<P: Serialize + DeserializeOwned> SweepFolder<P> {
     /// Returns whether metrics over time of the runs are kept: a sweep with very many runs has none.
     pub fn has_series(&self) -> bool {
         let list = self.path().join(FileManifest::name_for(RESULTS_STEM));
-        let is_listed = FileManifest::read(&list).is_ok_and(|(list, _)| list.files.contains(SERIES));
+        let is_listed =
+            FileManifest::read(&list).is_ok_and(|(list, _)| list.files.contains(SERIES));
         is_listed || self.path().join(SERIES).exists()
     }
 

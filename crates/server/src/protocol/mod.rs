@@ -38,8 +38,8 @@ mod typescript;
 pub use edit::Edit;
 pub use fleet::{Fleet, FleetNode};
 pub use reply::{
-    FileEntry, FileKind, MetricName, MetricRow, Problem, Reply, ReplyBody, ReplyResult, ServerNotification,
-    SessionState, SessionStatus, SweepRun, TargetRef,
+    FileEntry, FileKind, MetricName, MetricRow, Problem, Reply, ReplyBody, ReplyResult,
+    ServerNotification, SessionState, SessionStatus, SweepRun, TargetRef,
 };
 pub use request::{
     BodyId, ClientRequest, OpenTarget, RunMethod, ServerMethod, SessionMethod, Speed,

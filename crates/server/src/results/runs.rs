@@ -14,7 +14,8 @@ const MAX_RUNS: usize = 20_000;
 /// When it is no sweep, none of its runs is finished, or something in it is damaged.
 pub(crate) fn list_sweep_runs(path: &Path) -> Result<ReplyBody, Problem> {
     let folder = Folder::open(path).map_err(|e| problem(&e))?;
-    let FinishedRuns { table, is_complete, .. } = read_finished(&folder).map_err(|e| problem(&e))?;
+    let FinishedRuns { table, is_complete, .. } =
+        read_finished(&folder).map_err(|e| problem(&e))?;
     let plan = folder.plan();
     let names = plan.names();
     let all = table.runs();

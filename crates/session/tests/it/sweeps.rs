@@ -5,8 +5,8 @@ use sidestep_experiment::sweep::{Outcome, RunTable, Shard, Sweep, Trial, series_
 use sidestep_scenario::Source;
 use sidestep_session::report::document;
 use sidestep_session::sweep::{
-    Engine, Folder, OutcomeSink, SweepEnd, SweepResult, Task, TrialBatch, TrialExecutor, collect, create,
-    read_status, run_in_memory, run_remaining, run_share,
+    Engine, Folder, OutcomeSink, SweepEnd, SweepResult, Task, TrialBatch, TrialExecutor, collect,
+    create, read_status, run_in_memory, run_remaining, run_share,
 };
 use sidestep_session::{Error, NoWatcher};
 

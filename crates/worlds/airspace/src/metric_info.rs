@@ -5,8 +5,14 @@ use sidestep_scenario::MetricInfo;
 use std::sync::LazyLock;
 
 /// The metrics that charts show first.
-pub(super) const CHART_METRICS: [&str; 6] =
-    ["min_separation_m", "losses_of_separation", "mean_delay_percent", "arrived", "in_flight", "conflicts"];
+pub(super) const CHART_METRICS: [&str; 6] = [
+    "min_separation_m",
+    "losses_of_separation",
+    "mean_delay_percent",
+    "arrived",
+    "in_flight",
+    "conflicts",
+];
 
 /// Every metric of this world: the fields of its structs, and names that only tables have.
 pub(super) static METRIC_INFO: LazyLock<Vec<MetricInfo>> = LazyLock::new(|| {

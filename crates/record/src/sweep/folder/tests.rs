@@ -102,14 +102,20 @@ fn tables_and_shares_of_another_sweep_are_refused() {
             let file = own.path().join(table);
             let before = fs::read(&file).unwrap();
             fs::copy(other.path().join(table), &file).unwrap();
-            let refused = own.results::<String>().and_then(|_| own.timings::<String>()).and_then(|_| own.series::<String>());
+            let refused = own
+                .results::<String>()
+                .and_then(|_| own.timings::<String>())
+                .and_then(|_| own.series::<String>());
             let refused = refused.unwrap_err();
             assert!(refused.cause().contains("another sweep"), "{refused}");
             assert!(refused.remedy().contains("delete `results.parquet`"), "{refused}");
             fs::write(&file, before).unwrap();
         }
     }
-    own.results::<String>().and_then(|_| own.timings::<String>()).and_then(|_| own.series::<String>()).unwrap();
+    own.results::<String>()
+        .and_then(|_| own.timings::<String>())
+        .and_then(|_| own.series::<String>())
+        .unwrap();
     let (other, share) = (other("share", vec![4, 5], "g"), Share { index: 0, count: 1 });
     let journal = other.journal(share, |_: u32| ()).unwrap().unwrap();
     other.finish_share(share, journal, &refs).unwrap();

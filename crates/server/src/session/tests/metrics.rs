@@ -172,7 +172,10 @@ fn charts_begin_with_what_the_world_is_about_and_never_with_a_clock() {
         let entries: Vec<&Map<String, Value>> =
             names.iter().map(|name| name.as_object().expect("an object")).collect();
         assert!(entries.iter().all(|name| !name["key"].as_str().expect("text").ends_with("cpu_s")));
-        assert!(entries.is_sorted_by_key(|name| name["is_primary"] == false), "the primary ones first");
+        assert!(
+            entries.is_sorted_by_key(|name| name["is_primary"] == false),
+            "the primary ones first"
+        );
         let primary = entries.iter().filter(|name| name["is_primary"] == true);
         primary.map(|name| name["key"].as_str().expect("text").to_string()).collect()
     };
