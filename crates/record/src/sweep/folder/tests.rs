@@ -1,5 +1,6 @@
 //! A sweep from its plan to its table; and failures that leave nothing.
 
+use super::super::results::ResultColumns;
 use super::super::shares::Share;
 use super::*;
 use crate::create_error::replace_path;
@@ -68,15 +69,17 @@ fn a_sweep_goes_from_plan_over_shares_to_one_table() {
     folder.parts(|part| parts.push(part.columns)).unwrap();
     assert_eq!(parts, [cells()]);
     assert!(folder.results::<String>().unwrap_err().cause().contains("not done"));
-    let mut completion = folder.results_writer(&refs, &refs).unwrap();
+    let tables = ResultColumns { results: &refs, timings: &refs, series: &refs };
+    let mut completion = folder.results_writer(&tables).unwrap();
     assert!(!folder.is_complete());
-    completion.append(&refs, &refs).unwrap();
-    completion.append(&refs, &refs).unwrap();
+    completion.append(&tables).unwrap();
+    completion.append(&tables).unwrap();
     completion.finish().unwrap();
     let again = Folder::open(&path).unwrap();
     assert_eq!((again.plan(), again.is_complete()), (&vec![4, 5], true));
     let twice = ColumnValues::I64(vec![0, 1, 0, 1].into());
     assert_eq!(again.results::<String>().unwrap().columns[0].values, twice);
+    assert_eq!(again.series::<String>().unwrap().unwrap().columns[0].values, twice);
 }
 
 #[test]
@@ -138,8 +141,9 @@ fn a_table_of_runs_that_is_not_finished_and_a_place_to_join_them_leave_nothing()
     let before = names();
     let columns = cells();
     let refs: Vec<_> = columns.iter().collect();
-    let mut completion = folder.results_writer(&refs, &refs).unwrap();
-    completion.append(&refs, &refs).unwrap();
+    let tables = ResultColumns { results: &refs, timings: &refs, series: &refs };
+    let mut completion = folder.results_writer(&tables).unwrap();
+    completion.append(&tables).unwrap();
     drop(completion);
     // A kill leaves its files there.
     std::mem::forget(folder.temp_folder().unwrap());
