@@ -11,7 +11,7 @@ use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use sidestep_kernel::{Cycle, Interrupt};
 use sidestep_scenario::Worlds;
-use sidestep_session::export::{AnimationOptions, ExportRequest, Format, export};
+use sidestep_session::export::{AnimationOptions, ExportRequest, ExportScope, Format, export};
 use sidestep_session::{Error, RecordedRun, Watcher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -127,8 +127,7 @@ fn write_export(
     let out = folder.path().join("export");
     // The page gives the cycle on display: a picture shows it, everything else ends there.
     let is_picture = matches!(spec.format, Format::Svg | Format::Png { .. });
-    let request = ExportRequest {
-        form: spec.format.clone(),
+    let scope = ExportScope {
         out: Some(&out),
         replace: false,
         from: spec.cycle.filter(|_| is_picture),
@@ -136,6 +135,7 @@ fn write_export(
         every: None,
         workers,
     };
+    let request = ExportRequest { form: spec.format.clone(), scope };
     let watcher = SizeLimitWatcher { cancel, folder: folder.path() };
     let exported = export(&recorded, &request, &watcher);
     // An export that was stopped because of its size ends like one that was cancelled.

@@ -1,12 +1,15 @@
 //! Exports of recorded runs to other formats. Tables are copied from the run folder; everything
 //! else is computed again from the recorded scenario.
 
+mod frame_export;
 mod geojson;
 mod league;
 mod pictures;
 mod tables;
 mod target;
 mod trajectory;
+
+pub use frame_export::FrameExport;
 
 use crate::driver::{Sinks, drive};
 use crate::frame_sink::{BagSink, EndReason, McapSink};
@@ -59,6 +62,13 @@ pub struct AnimationOptions {
 pub struct ExportRequest<'a> {
     /// The format, with its own options.
     pub form: Format,
+    /// The part of the run, and the place.
+    pub scope: ExportScope<'a>,
+}
+
+/// The part of a run that is exported, and the place of the result.
+#[derive(Debug, Clone)]
+pub struct ExportScope<'a> {
     /// The file or folder; `None` for one beside the recorded run, with its name.
     pub out: Option<&'a Path>,
     /// Whether an earlier export is replaced; without it the export is refused where something exists.
@@ -105,8 +115,8 @@ pub fn export(
     recorded.check_has_content()?;
     let job = ExportContext {
         recorded,
-        wanted,
-        span: CycleRange::from_request(wanted, recorded)?,
+        wanted: &wanted.scope,
+        span: CycleRange::from_request(&wanted.scope, recorded)?,
         watcher,
     };
     match &wanted.form {
@@ -129,7 +139,7 @@ pub fn export(
 /// An export whose cycles were checked against the recorded ones.
 struct ExportContext<'a> {
     recorded: &'a RecordedRun,
-    wanted: &'a ExportRequest<'a>,
+    wanted: &'a ExportScope<'a>,
     span: CycleRange,
     watcher: &'a dyn Watcher,
 }
@@ -143,7 +153,7 @@ struct CycleRange {
 
 impl CycleRange {
     fn from_request(
-        wanted: &ExportRequest<'_>,
+        wanted: &ExportScope<'_>,
         recorded: &RecordedRun,
     ) -> Result<Self, InputError> {
         let done = recorded.cycles_done;

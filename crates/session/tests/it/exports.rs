@@ -1,20 +1,20 @@
 //! Recorded runs in other formats.
 
 use crate::support::{StopAt, TestFolder, WORLDS, names};
-use sidestep_session::export::{AnimationOptions, ExportRequest, Format, export};
+use sidestep_session::export::{AnimationOptions, ExportRequest, ExportScope, Format, export};
 use sidestep_session::{Error, NoWatcher, OutputPaths, RecordedRun, replay_all};
 use std::path::{Path, PathBuf};
 
 pub(crate) fn wanted(form: Format, out: &Path) -> ExportRequest<'_> {
-    ExportRequest {
-        form,
+    let scope = ExportScope {
         out: Some(out),
         replace: false,
         from: None,
         until: None,
         every: None,
         workers: 1,
-    }
+    };
+    ExportRequest { form, scope }
 }
 
 #[test]
@@ -35,14 +35,16 @@ fn a_run_goes_out_in_every_form() {
     for (name, form, begins) in forms {
         let is_computed = !matches!(form, Format::Csv(_) | Format::Parquet(_));
         let out = place.path(name);
-        let every = Some(500);
-        let written = export(&recorded, &ExportRequest { every, ..wanted(form, &out) }, &NoWatcher);
+        let mut request = wanted(form, &out);
+        request.scope.every = Some(500);
+        let written = export(&recorded, &request, &NoWatcher);
         let written = written.unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(written.is_confirmed, is_computed, "{name}");
         assert!(std::fs::read(&out).expect("written").starts_with(begins), "{name}");
     }
     let frames = place.path("frames");
-    let last = ExportRequest { from: Some(5000), ..wanted(Format::Frames(film), &frames) };
+    let mut last = wanted(Format::Frames(film), &frames);
+    last.scope.from = Some(5000);
     let written = export(&recorded, &last, &NoWatcher).expect("written");
     assert_eq!(written.film, Some((145, 10)));
     let tables = export(&recorded, &wanted(Format::Csv(None), &place.path("csv")), &NoWatcher);
@@ -71,21 +73,19 @@ fn a_recording_is_not_exported_onto_itself() {
     place.start(1, keep).expect("started").run_to_end(&NoWatcher).expect("no bug");
     let before = std::fs::read(&file).expect("there");
     let recorded = RecordedRun::open(&WORLDS, &file).expect("recorded");
-    let part = ExportRequest {
-        replace: true,
-        from: Some(10),
-        until: Some(20),
-        ..wanted(Format::Mcap, &file)
-    };
+    let mut part = wanted(Format::Mcap, &file);
+    part.scope = ExportScope { replace: true, from: Some(10), until: Some(20), ..part.scope };
     let other_name = place.path("./live.mcap");
     for out in [Some(&*file), Some(&*other_name), None] {
-        let refused = export(&recorded, &ExportRequest { out, ..part.clone() }, &NoWatcher);
+        part.scope.out = out;
+        let refused = export(&recorded, &part, &NoWatcher);
         let told = refused.expect_err("itself").to_string();
         assert!(told.contains("the recording that is exported"), "{told}");
         assert!(std::fs::read(&file).expect("there") == before);
     }
     let out = place.path("part.mcap");
-    export(&recorded, &ExportRequest { out: Some(&out), ..part }, &NoWatcher).expect("beside it");
+    part.scope.out = Some(&out);
+    export(&recorded, &part, &NoWatcher).expect("beside it");
 }
 
 #[test]
@@ -94,7 +94,8 @@ fn a_folder_that_is_named_with_a_slash_at_its_end_is_replaced_by_the_new_export(
     let recorded = RecordedRun::open(&WORLDS, &place.record("run").0).expect("recorded");
     let out = place.path("out/");
     for replace in [false, true] {
-        let wanted = ExportRequest { replace, ..wanted(Format::Csv(None), &out) };
+        let mut wanted = wanted(Format::Csv(None), &out);
+        wanted.scope.replace = replace;
         export(&recorded, &wanted, &NoWatcher).expect("written");
         assert!(out.join("events.csv").is_file() && out.join("trajectories.csv").is_file());
         assert_eq!(names(&place), ["out", "pond.toml", "run"]);

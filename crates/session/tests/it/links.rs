@@ -21,7 +21,8 @@ fn a_link_to_a_folder_stays_a_link_also_with_a_slash_at_its_end() {
         let sweep = crate::sweeps::sweep(&place);
         create(&WORLDS, &sweep, &named("sweep"), 1, &NoWatcher).expect("planned");
         let tables = named("tables");
-        let wanted = ExportRequest { replace: true, ..wanted(Format::Csv(None), &tables) };
+        let mut wanted = wanted(Format::Csv(None), &tables);
+        wanted.scope.replace = true;
         let recorded = RecordedRun::open(&WORLDS, &recorded).expect("recorded");
         export(&recorded, &wanted, &NoWatcher).expect("written");
         for name in ["run", "sweep", "tables"] {
