@@ -9,7 +9,7 @@
 //! metric_history.rs  metrics over time
 //! event_store.rs  events             fleet_feed.rs    views of fleets
 //! files.rs     readable files        write.rs     writable files          file_choices.rs  files for a text
-//! results/     reports, exports
+//! results/     reports, exports        replay_page/    recorded runs as one file that needs no server
 //! ```
 //! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel, and take replies, states
 //! and frames from an outbox; sessions put them there without waiting. So no action or omission of a page affects a
@@ -30,6 +30,7 @@ mod metric_history;
 mod outbox;
 mod page;
 pub mod protocol;
+pub mod replay_page;
 mod request;
 mod results;
 mod serve;

@@ -37,7 +37,7 @@ pub(crate) fn answer(path: &str, headers: &HeaderMap) -> Response {
     let path = path.trim_start_matches('/');
     let is_page = path.is_empty() || !path.rsplit('/').next().unwrap_or_default().contains('.');
     let name = if is_page { "index.html" } else { path };
-    let Some(asset) = ASSETS.iter().find(|asset| asset.path == name) else {
+    let Some(asset) = find(name) else {
         return (StatusCode::NOT_FOUND, "There is no such file.\n").into_response();
     };
     let is_immutable = asset.path.starts_with(IMMUTABLE_FOLDER);
@@ -63,9 +63,44 @@ pub(crate) fn answer(path: &str, headers: &HeaderMap) -> Response {
     }
 }
 
+/// The files that the page needs first; it loads others only to edit.
+pub(crate) struct EntryFiles<'a> {
+    pub(crate) script: &'a str,
+    pub(crate) style: &'a str,
+    pub(crate) icon: &'a [u8],
+}
+
+/// Returns the files that the page needs first; none where the program has no page.
+pub(crate) fn entry_files() -> Option<EntryFiles<'static>> {
+    let index = std::str::from_utf8(find("index.html")?.bytes).ok()?;
+    // Written by the page's build: each attribute occurs once with this ending.
+    let referred = |ending: &str| {
+        let mut values = index.split('"');
+        let path = values.find(|value| value.starts_with('/') && value.ends_with(ending))?;
+        find(path.trim_start_matches('/'))
+    };
+    Some(EntryFiles {
+        script: std::str::from_utf8(referred(".js")?.bytes).ok()?,
+        style: std::str::from_utf8(referred(".css")?.bytes).ok()?,
+        icon: referred(".svg")?.bytes,
+    })
+}
+
+fn find(path: &str) -> Option<&'static PageAsset> {
+    ASSETS.iter().find(|asset| asset.path == path)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_the_page_needs_first_is_one_script_and_one_style() {
+        let Some(EntryFiles { script, style, .. }) = entry_files() else { return };
+        // A replay in one file has no place for a second one.
+        assert!(!script.contains("from\"./") && !script.contains("import\"./"));
+        assert!(!style.contains("url(") && !style.contains("@import") && !style.contains("</"));
+    }
 
     #[test]
     fn the_page_is_there_under_all_its_addresses_and_nothing_else_is() {

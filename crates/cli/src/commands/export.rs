@@ -10,7 +10,12 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_record::origins_text;
-use sidestep_session::export::{self, AnimationOptions, ExportRequest, ExportResult};
+use sidestep_server::replay_page::{
+    AgentNumber, CycleWindow, InspectionRequest, PageRequest, PageResult, export_page,
+};
+use sidestep_session::export::{
+    self, AnimationOptions, ExportRequest, ExportResult, ExportScope, Format,
+};
 use sidestep_session::{RecordedRun, display_path};
 use std::path::{Path, PathBuf};
 
@@ -25,6 +30,8 @@ Examples:
   sidestep export runs/office --to gif --from 1000 --until 2000
   sidestep export runs/office --to png --from 1234  one moment
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
+  sidestep export runs/office --to page             one file for any browser
+  sidestep export runs/office --to page --agents 1,8 --cycles 200:400
 
 Tables are copied from the run folder; those of a flight in real time come with a file that says \
 which cycles were flown and which simulated. Everything else is computed again from the recorded \
@@ -59,6 +66,8 @@ enum ExportFormat {
     Png,
     /// Animated GIF
     Gif,
+    /// The studio's view of the run as one HTML file, which needs no server and no network
+    Page,
     /// Numbered PNG frames, to be made into a video
     #[value(name = "mp4-frames")]
     Mp4Frames,
@@ -77,6 +86,7 @@ impl ExportFormat {
             Self::Svg => "svg",
             Self::Png => "png",
             Self::Gif => "gif",
+            Self::Page => "page",
             Self::Mp4Frames => "mp4-frames",
         }
     }
@@ -118,8 +128,8 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "C")]
     until: Option<Cycle>,
 
-    /// Export every N-th cycle [default: every cycle; of animations, at most 150 frames]; tables
-    /// always have all events
+    /// Export every N-th cycle [default: every cycle; of animations, at most 150 frames, of pages
+    /// 20,000]; tables always have all events
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     every: Option<Cycle>,
 
@@ -134,6 +144,15 @@ pub(crate) struct ExportArgs {
     /// Longer side of pictures in pixels [default: gif 640, mp4-frames 1280, png 1600]
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(64..=4096))]
     width: Option<u16>,
+
+    /// Agents that a click shows what they perceived, decided and did (page): their numbers, with that
+    /// of a part where one is meant, e.g. 1,8 or 0/17 [default: all in the cycles of --cycles, else none]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    agents: Vec<AgentNumber>,
+
+    /// Cycles for which agents can be clicked (page) [default: with --agents, all]
+    #[arg(long, value_name = "A:B")]
+    cycles: Option<CycleWindow>,
 
     #[command(flatten)]
     workers: WorkersArg,
@@ -153,12 +172,66 @@ pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Fa
     if let Some(warning) = incomplete_warning(&recorded) {
         console.warn(&warning);
     }
-    match export::export(&recorded, &export_request(args), &ConsoleWatcher::new(console)) {
+    let watcher = ConsoleWatcher::new(console);
+    let result = match export_format(args) {
+        Some(form) => {
+            let request = ExportRequest { form, scope: export_scope(args) };
+            export::export(&recorded, &request, &watcher).map(Exported::from)
+        }
+        None => export_page(worlds(), &recorded, &page_request(args), &watcher).map(Exported::from),
+    };
+    match result {
         Err(Failure::Interrupted) => Ok(ExitCode::Interrupted),
         result => {
             print_result(args.to, &recorded, &result?, console)?;
             Ok(ExitCode::Done)
         }
+    }
+}
+
+/// What was written, and what a page holds.
+struct Exported {
+    written: ExportResult,
+    page: Option<PageContent>,
+}
+
+struct PageContent {
+    frames: u64,
+    every: Cycle,
+    inspections: usize,
+    events_left_out: u64,
+}
+
+impl From<ExportResult> for Exported {
+    fn from(written: ExportResult) -> Self {
+        Self { written, page: None }
+    }
+}
+
+impl From<PageResult> for Exported {
+    fn from(result: PageResult) -> Self {
+        let PageResult { written, frames, every, inspections, events_left_out } = result;
+        Self { written, page: Some(PageContent { frames, every, inspections, events_left_out }) }
+    }
+}
+
+impl PageContent {
+    /// Returns what the page holds, and what it does not.
+    fn text(&self) -> String {
+        let frames = group_thousands(self.frames);
+        let every = match self.every {
+            1 => "one for each cycle".to_string(),
+            every => format!("one every {} cycles", group_thousands(every)),
+        };
+        let inspections = match self.inspections {
+            0 => "no inspections: --agents and --cycles choose some".to_string(),
+            count => format!("{} inspections", group_thousands(count as u64)),
+        };
+        let lost = match self.events_left_out {
+            0 => String::new(),
+            count => format!("  {} events are not in it: too many\n", group_thousands(count)),
+        };
+        format!("  {frames} frames, {every}; {inspections}\n{lost}")
     }
 }
 
@@ -179,23 +252,27 @@ fn incomplete_warning(recorded: &RecordedRun) -> Option<String> {
     })
 }
 
-fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
+/// Returns the format with its options; none for the page, which is no format of the session's.
+fn export_format(args: &ExportArgs) -> Option<Format> {
     let animation = AnimationOptions { fps: args.fps, width_px: args.width };
-    let format = match args.to {
-        ExportFormat::Csv => export::Format::Csv(args.table.clone()),
-        ExportFormat::Parquet => export::Format::Parquet(args.table.clone()),
-        ExportFormat::GeoJson => export::Format::GeoJson,
-        ExportFormat::Lorr => export::Format::League,
-        ExportFormat::Mcap => export::Format::Mcap,
-        ExportFormat::RosBag => export::Format::RosBag,
-        ExportFormat::Trajectory => export::Format::Trajectory,
-        ExportFormat::Svg => export::Format::Svg,
-        ExportFormat::Png => export::Format::Png { width_px: args.width },
-        ExportFormat::Gif => export::Format::Gif(animation),
-        ExportFormat::Mp4Frames => export::Format::Frames(animation),
-    };
-    ExportRequest {
-        form: format,
+    Some(match args.to {
+        ExportFormat::Csv => Format::Csv(args.table.clone()),
+        ExportFormat::Parquet => Format::Parquet(args.table.clone()),
+        ExportFormat::GeoJson => Format::GeoJson,
+        ExportFormat::Lorr => Format::League,
+        ExportFormat::Mcap => Format::Mcap,
+        ExportFormat::RosBag => Format::RosBag,
+        ExportFormat::Trajectory => Format::Trajectory,
+        ExportFormat::Svg => Format::Svg,
+        ExportFormat::Png => Format::Png { width_px: args.width },
+        ExportFormat::Gif => Format::Gif(animation),
+        ExportFormat::Mp4Frames => Format::Frames(animation),
+        ExportFormat::Page => return None,
+    })
+}
+
+fn export_scope(args: &ExportArgs) -> ExportScope<'_> {
+    ExportScope {
         out: args.out.as_deref(),
         replace: args.replace,
         from: args.from,
@@ -203,6 +280,11 @@ fn export_request(args: &ExportArgs) -> ExportRequest<'_> {
         every: args.every,
         workers: args.workers.count(),
     }
+}
+
+fn page_request(args: &ExportArgs) -> PageRequest<'_> {
+    let inspections = InspectionRequest { agents: args.agents.clone(), cycles: args.cycles };
+    PageRequest { scope: export_scope(args), inspections }
 }
 
 /// Refuses options that have no effect on the chosen format.
@@ -214,6 +296,8 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
         ("--from", args.from.is_some(), format != ExportFormat::Lorr),
         ("--every", args.every.is_some(), !format.is_picture() && format != ExportFormat::Lorr),
         ("--table", args.table.is_some(), format.is_table()),
+        ("--agents", !args.agents.is_empty(), format == ExportFormat::Page),
+        ("--cycles", args.cycles.is_some(), format == ExportFormat::Page),
         ("--fps", args.fps.is_some(), format.is_animation()),
         ("--width", args.width.is_some(), format.is_animation() || format == ExportFormat::Png),
     ];
@@ -230,9 +314,10 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
 fn print_result(
     format: ExportFormat,
     recorded: &RecordedRun,
-    written: &ExportResult,
+    exported: &Exported,
     console: Console,
 ) -> Result<(), Failure> {
+    let Exported { written, page } = exported;
     let ExportResult { paths, is_confirmed, film: animation } = written;
     let shown: Vec<String> = paths.iter().map(display_path).collect();
     let origins = &recorded.origins;
@@ -247,12 +332,13 @@ fn print_result(
         let animation = animation.map_or(String::new(), |(pictures, fps)| {
             animation_text(format, pictures, fps, &paths[0])
         });
+        let page = page.as_ref().map_or(String::new(), PageContent::text);
         let origins = if recorded.is_flight {
             format!("  {}\n", origins_text(origins))
         } else {
             String::new()
         };
-        format!("{names}{size}{confirmed}{origins}{animation}")
+        format!("{names}{size}{page}{confirmed}{origins}{animation}")
     })
 }
 

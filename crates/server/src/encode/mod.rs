@@ -1,8 +1,10 @@
 //! Frames as bytes, and the messages beside them. The layout is in [`protocol`](crate::protocol).
 
 mod body_set;
+mod columns;
 mod convert;
 
+pub(crate) use columns::FrameColumns;
 pub(crate) use convert::{event, problem, requested_body, scan, scene};
 
 use crate::protocol::{BodyTable, FrameText, SessionId, VERSION};

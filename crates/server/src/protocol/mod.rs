@@ -29,6 +29,7 @@ mod edit;
 mod fleet;
 #[cfg(test)]
 mod inspection;
+mod replay;
 mod reply;
 mod request;
 mod scene;
@@ -37,6 +38,9 @@ mod typescript;
 
 pub use edit::Edit;
 pub use fleet::{Fleet, FleetNode};
+pub use replay::{
+    ReplayChunk, ReplayEvents, ReplayFile, ReplayInspection, ReplayRun, ReplaySpan,
+};
 pub use reply::{
     FileEntry, FileKind, MetricName, MetricRow, Problem, Reply, ReplyBody, ReplyResult,
     ServerNotification, SessionState, SessionStatus, SweepRun, TargetRef,

@@ -63,6 +63,12 @@ fn types() -> String {
         FrameText,
         Scan,
         RunEvent,
+        ReplayFile,
+        ReplayRun,
+        ReplayChunk,
+        ReplaySpan,
+        ReplayEvents,
+        ReplayInspection,
     ];
     let version = format!(
         "/** Version of requests, replies, notifications and frames together. */\nexport const VERSION = {VERSION};\n"

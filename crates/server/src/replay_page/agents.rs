@@ -1,0 +1,183 @@
+//! Which agents are inspected for a replay, and in which cycles.
+
+use sidestep_kernel::view::{Body, Frame};
+use sidestep_kernel::{Cycle, InputError};
+use std::fmt;
+use std::str::FromStr;
+
+/// An agent by its number, and by that of a part where only one is meant: `8`, `8/17`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AgentNumber {
+    number: u32,
+    part: Option<u32>,
+}
+
+impl AgentNumber {
+    fn matches(self, body: &Body) -> bool {
+        body.number == self.number && (self.part.is_none() || body.part == self.part)
+    }
+}
+
+impl FromStr for AgentNumber {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (number, part) = match text.split_once('/') {
+            Some((number, part)) => (number.parse(), Some(part.parse())),
+            None => (text.parse(), None),
+        };
+        let wrong = || format!("`{text}` is no number of an agent, like 8, or 8/17 with a part");
+        let number = number.map_err(|_| wrong())?;
+        let part = part.transpose().map_err(|_| wrong())?;
+        Ok(Self { number, part })
+    }
+}
+
+impl fmt::Display for AgentNumber {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.part {
+            Some(part) => write!(out, "{}/{part}", self.number),
+            None => write!(out, "{}", self.number),
+        }
+    }
+}
+
+/// Cycles from one to another, both included: `200:400`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CycleWindow {
+    from: Cycle,
+    until: Cycle,
+}
+
+impl FromStr for CycleWindow {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is no window of cycles, like 200:400");
+        let (from, until) = text.split_once(':').ok_or_else(wrong)?;
+        let from = from.parse().map_err(|_| wrong())?;
+        let until = until.parse().map_err(|_| wrong())?;
+        if until < from {
+            return Err(format!("the window ends at {until}, before it begins at {from}"));
+        }
+        Ok(Self { from, until })
+    }
+}
+
+/// The inspections that a replay holds: of some agents or of all, in all cycles or in some; of none without either.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct InspectionRequest {
+    /// The agents; none given means all where there is a window.
+    pub agents: Vec<AgentNumber>,
+    /// The cycles; none given means all where there are agents.
+    pub cycles: Option<CycleWindow>,
+}
+
+impl InspectionRequest {
+    /// Returns the agents of a frame that are inspected in its cycle.
+    pub(super) fn agents_of<'a>(&self, frame: &'a Frame) -> Vec<&'a Body> {
+        let is_in_window = |window: CycleWindow| (window.from..=window.until).contains(&frame.cycle);
+        let is_due = self.cycles.map_or(!self.agents.is_empty(), is_in_window);
+        if !is_due {
+            return Vec::new();
+        }
+        let agents = frame.bodies.iter().filter(|body| body.kind.is_agent());
+        agents.filter(|body| self.includes(body)).collect()
+    }
+
+    fn includes(&self, body: &Body) -> bool {
+        self.agents.is_empty() || self.agents.iter().any(|agent| agent.matches(body))
+    }
+
+    /// Refuses agents and cycles that the part of the run does not have; `first` is its first frame.
+    ///
+    /// # Errors
+    /// When an agent is not there, or the window has none of the cycles.
+    pub(super) fn check(
+        &self,
+        first: &Frame,
+        (from, until): (Cycle, Cycle),
+    ) -> Result<(), InputError> {
+        if let Some(window) = self.cycles
+            && (window.from > until || window.until < from)
+        {
+            let place = format!("--cycles {}:{}", window.from, window.until);
+            let cause = format!("the file has cycles {from} to {until}");
+            return Err(InputError::new(place, cause, format!("give {from}:{until} or less")));
+        }
+        let agents: Vec<&Body> = first.bodies.iter().filter(|body| body.kind.is_agent()).collect();
+        for agent in &self.agents {
+            // Airplanes may come later: only a number that is beyond all is certainly wrong.
+            let is_there = agents.iter().any(|body| agent.matches(body));
+            let highest = agents.iter().map(|body| body.number).max().unwrap_or(0);
+            if !is_there && agent.number > highest {
+                let cause = format!("there is no such agent: their numbers are 0 to {highest}");
+                let remedy = "give numbers as the list of agents of the studio has them";
+                return Err(InputError::new(format!("--agents {agent}"), cause, remedy));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns what can be inspected, in words; `noun` is that for an agent.
+    pub(super) fn describe(&self, noun: &str) -> String {
+        let numbers: Vec<String> = self.agents.iter().map(ToString::to_string).collect();
+        let who = match numbers.as_slice() {
+            [] => format!("every {noun}"),
+            [one] => format!("{noun} {one}"),
+            _ => format!("{noun}s {}", numbers.join(", ")),
+        };
+        match self.cycles {
+            None if numbers.is_empty() => String::new(),
+            None => format!("{who} in all cycles"),
+            Some(CycleWindow { from, until }) => format!("{who} in cycles {from} to {until}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep::worlds::robots::kinds::ROBOT;
+    use sidestep_kernel::view::{Pose, Shape};
+
+    fn frame(cycle: Cycle) -> Frame {
+        let robot = |number| {
+            let shape = Shape::Sphere { radius_m: 0.1 };
+            Body::new(ROBOT, number, Pose::from_position([0.0; 3]), shape)
+        };
+        Frame { cycle, bodies: (0..4).map(robot).collect(), ..Frame::default() }
+    }
+
+    fn request(agents: &[&str], cycles: Option<&str>) -> InspectionRequest {
+        InspectionRequest {
+            agents: agents.iter().map(|text| text.parse().expect("a number")).collect(),
+            cycles: cycles.map(|text| text.parse().expect("a window")),
+        }
+    }
+
+    #[test]
+    fn agents_and_cycles_are_those_that_were_named() {
+        let numbers = |request: &InspectionRequest, cycle| -> Vec<u32> {
+            request.agents_of(&frame(cycle)).iter().map(|body| body.number).collect()
+        };
+        assert_eq!(numbers(&request(&[], None), 5), []);
+        assert_eq!(numbers(&request(&["3", "1"], None), 5), [1, 3]);
+        assert_eq!(numbers(&request(&[], Some("4:6")), 6), [0, 1, 2, 3]);
+        assert_eq!(numbers(&request(&["2", "0/7"], Some("4:6")), 4), [2]);
+        assert_eq!(numbers(&request(&["2"], Some("4:6")), 7), []);
+        assert_eq!(request(&["2", "0/7"], Some("4:6")).describe("robot"), "robots 2, 0/7 in cycles 4 to 6");
+        assert_eq!(request(&[], None).describe("robot"), "");
+    }
+
+    #[test]
+    fn what_is_not_there_is_refused_in_words() {
+        let check = |request: InspectionRequest| request.check(&frame(0), (0, 100));
+        let told = |request| check(request).expect_err("refused").to_string();
+        assert!(told(request(&["4"], None)).contains("their numbers are 0 to 3"));
+        assert!(told(request(&[], Some("101:200"))).contains("cycles 0 to 100"));
+        assert!(check(request(&["3"], Some("100:200"))).is_ok());
+        assert!("1:x".parse::<CycleWindow>().is_err() && "9:2".parse::<CycleWindow>().is_err());
+        assert!("-1".parse::<AgentNumber>().is_err() && "1/".parse::<AgentNumber>().is_err());
+    }
+}
