@@ -15,6 +15,7 @@ export type Action =
   | "fit"
   | "center"
   | "trails"
+  | "follow"
   | "left"
   | "right"
   | "up"
@@ -50,6 +51,7 @@ export const KEYS: readonly Key[] = [
   { action: "fit", keys: ["f"], labels: ["f"], words: "fit everything into the view" },
   { action: "center", keys: ["c"], labels: ["c"], words: "center the selection" },
   { action: "trails", keys: ["t"], labels: ["t"], words: "trails: of the selection, of all, none" },
+  { action: "follow", keys: ["v"], labels: ["v"], words: "the view follows the selection, or stays" },
   { action: "left", keys: ["a"], labels: ["a"], words: "move or turn the view left" },
   { action: "right", keys: ["d"], labels: ["d"], words: "right" },
   { action: "up", keys: ["w"], labels: ["w"], words: "up" },

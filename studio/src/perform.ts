@@ -81,7 +81,8 @@ function view(action: Action, session: Session): void {
   if (action === "fit") viewport?.fit();
   if (action === "trails")
     session.display.trails = TRAILS[(TRAILS.indexOf(session.display.trails) + 1) % TRAILS.length]!;
-  if (action === "edit" && !session.isFleet) page.edits = !page.edits;
+  if (action === "follow") session.display.follows = !session.display.follows;
+  if (action === "edit" && !session.isFleet && !session.isReplay) page.edits = !page.edits;
   if (action === "deselect") session.selection.select(null);
   if (action === "filter") {
     page.tab = "agents";

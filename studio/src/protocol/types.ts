@@ -995,6 +995,168 @@ unit: string,
 text: string, };
 
 /**
+ * All that a replay in one file holds.
+ */
+export type ReplayFile = {
+/**
+ * See [`VERSION`](super::VERSION).
+ */
+version: number,
+/**
+ * The program that made it, and its build.
+ */
+program: string,
+/**
+ * The runs, which are opened in this order.
+ */
+runs: Array<ReplayRun>, };
+
+/**
+ * A recorded run in a replay.
+ */
+export type ReplayRun = {
+/**
+ * The name of the recording, without the folder that it was in.
+ */
+name: string,
+/**
+ * The scene.
+ */
+scene: Scene,
+/**
+ * The state at the first frame.
+ */
+status: SessionStatus,
+/**
+ * Digest of the state at the last frame; none if the run ends later.
+ */
+digest: string | null,
+/**
+ * The cycles of the frames: first cycle, cycles between two frames, number of frames.
+ */
+cycles: Array<[number, number, number]>,
+/**
+ * The part with all body tables, in the order of their numbers from 1 on.
+ */
+tables: number,
+/**
+ * The part with the reply to the request for the scenario.
+ */
+source: number,
+/**
+ * The part with the reply to the request for all samples of metrics.
+ */
+metrics: number,
+/**
+ * The parts with frames, in their order.
+ */
+chunks: Array<ReplayChunk>,
+/**
+ * The parts with events, in their order.
+ */
+events: Array<ReplaySpan>,
+/**
+ * Number of events that are not in the file.
+ */
+events_left_out: number,
+/**
+ * The parts with inspections, in their order.
+ */
+inspections: Array<ReplaySpan>,
+/**
+ * What can be inspected, in words.
+ */
+inspected: string, };
+
+/**
+ * A part with frames.
+ */
+export type ReplayChunk = {
+/**
+ * Its number.
+ */
+part: number,
+/**
+ * Number of frames.
+ */
+frames: number, };
+
+/**
+ * A part with things of some cycles.
+ */
+export type ReplaySpan = {
+/**
+ * Its number.
+ */
+part: number,
+/**
+ * The cycle of its first item.
+ */
+from: number,
+/**
+ * The cycle of its last item.
+ */
+until: number,
+/**
+ * Number of items.
+ */
+count: number, };
+
+/**
+ * Events as columns: item i of each column belongs to event i. Fields are those of a `RunEvent`.
+ */
+export type ReplayEvents = {
+/**
+ * The cycles since the event before; of the first event, its cycle.
+ */
+cycle: Array<number>,
+/**
+ * Severities.
+ */
+level: Array<string>,
+/**
+ * Kinds.
+ */
+kind: Array<string>,
+/**
+ * The bodies concerned.
+ */
+body: Array<BodyId | null>,
+/**
+ * The others that took part.
+ */
+other: Array<BodyId | null>,
+/**
+ * Places in meters.
+ */
+at_m: Array<[number, number, number] | null>,
+/**
+ * Values.
+ */
+value: Array<number | null>,
+/**
+ * Units of the values.
+ */
+unit: Array<string>,
+/**
+ * The events as text.
+ */
+text: Array<string>, };
+
+/**
+ * What an agent perceived, decided and did in a cycle.
+ */
+export type ReplayInspection = {
+/**
+ * The inspection, with its cycle.
+ */
+inspection: Inspection,
+/**
+ * The scans of the body.
+ */
+scans: Array<Scan>, };
+
+/**
  * Percepts and decisions of a body in a cycle, and their outcome.
  */
 export type Inspection = {

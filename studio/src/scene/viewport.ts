@@ -35,6 +35,8 @@ export interface ViewOptions {
   inspection: Inspection | null;
   trails: TrailMode;
   widthIsTrue: boolean;
+  /** Whether the selected body stays in the center. */
+  follows: boolean;
   /** Pairs that hear each other in a fleet, by the bodies' indices. */
   links: readonly Link[];
 }
@@ -91,7 +93,14 @@ export class Viewport {
   #bodies: Bodies | null = null;
   #frame: Frame | null = null;
   #trails: Trails | null = null;
-  #options: ViewOptions = { selected: null, inspection: null, trails: "none", widthIsTrue: false, links: [] };
+  #options: ViewOptions = {
+    selected: null,
+    inspection: null,
+    trails: "none",
+    widthIsTrue: false,
+    follows: false,
+    links: [],
+  };
   #hovered: number | undefined;
   #extent: Extent;
   #size: [number, number] = [1, 1];
@@ -173,6 +182,7 @@ export class Viewport {
     this.#trails?.push(frame.cycle, frame.positions_m, isSought);
     if (isFirst) this.#extent = extentOf(this.#scene, this.#bodies, frame);
     if (isFirst && !this.#isFitted) this.fit();
+    this.#follow();
     this.#bodiesChanged = this.#marksChanged = true;
     this.requestDraw();
   }
@@ -180,7 +190,15 @@ export class Viewport {
   setOptions(options: ViewOptions): void {
     this.#options = options;
     this.#marksChanged = true;
+    this.#follow();
     this.requestDraw();
+  }
+
+  /** Centers the selected body, if the view follows it. */
+  #follow(): void {
+    const { follows, selected } = this.#options;
+    const index = follows && selected ? this.#bodies?.find(selected) : undefined;
+    if (index !== undefined) this.center(index);
   }
 
   /** Shows everything. */

@@ -6,6 +6,8 @@ export class Display {
   trails = $state<TrailMode>("selected");
   /** Whether lines are drawn at their true width. */
   widthIsTrue = $state(false);
+  /** Whether the view follows the selected body. */
+  follows = $state(false);
   /** Cycle under the pointer in the timeline or a chart. */
   cursor = $state<number | null>(null);
 }

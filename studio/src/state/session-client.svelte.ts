@@ -8,6 +8,8 @@ export interface SessionHost {
   request(call: ServerMethod): Promise<ReplyBody>;
   requestSession(session: number, call: SessionMethod): Promise<ReplyBody>;
   onProblem(problem: Problem): void;
+  /** Whether the page is a replay in one file: it has no server, and runs are only shown. */
+  readonly isReplay?: boolean;
 }
 
 const SESSION_NOT_OPEN = makeProblem("session", "it is not open on the server", "wait until the page has reconnected");
@@ -26,6 +28,11 @@ export class SessionClient {
   /** Returns whether the server has this session and can still serve it. */
   get isLive(): boolean {
     return this.id !== 0 && this.ended === null;
+  }
+
+  /** Returns whether the page is a replay in one file. */
+  get isReplay(): boolean {
+    return this.#host.isReplay ?? false;
   }
 
   /** Sends a request to the session. */

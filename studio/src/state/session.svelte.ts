@@ -53,9 +53,15 @@ export class Session {
     return this.target.kind === "fleet";
   }
 
-  /** The folder of the recording, if it is one: only folders have reports. */
+  /** Returns whether it is a run of a replay in one file: it is only shown. */
+  get isReplay(): boolean {
+    return this.client.isReplay;
+  }
+
+  /** The folder of the recording, if it is one on a server: only folders have reports. */
   get folder(): string | null {
     const { target } = this;
+    if (this.isReplay) return null;
     return target.kind === "recording" && !/\.mcap$/i.test(target.path) ? target.path : null;
   }
 

@@ -22,6 +22,8 @@ export interface Banner {
 /** The environment of a studio: sockets, timers, and the access status. */
 export interface StudioEnvironment extends Environment {
   accessStatus(): Promise<AccessStatus>;
+  /** Whether the page is a replay in one file. */
+  readonly isReplay?: boolean;
 }
 
 /** A sweep, by its folder. */
@@ -62,6 +64,11 @@ export class Studio {
     };
     this.#environment = around;
     this.#connection = new Connection(listener, around);
+  }
+
+  /** Returns whether the page is a replay in one file: there is nothing else to open, and nothing to edit. */
+  get isReplay(): boolean {
+    return this.#environment.isReplay ?? false;
   }
 
   get activeKey(): number {
@@ -129,10 +136,11 @@ export class Studio {
       request: this.request,
       requestSession: this.#requestSession,
       onProblem: (problem) => this.onProblem(problem),
+      isReplay: this.isReplay,
     });
     if (!(await this.#openAt(session, seed))) return false;
     // A fleet is known only as long as it is on the studio's command line.
-    if (!session.isFleet) remember(target, session.run.scene.name);
+    if (!session.isFleet && !session.isReplay) remember(target, session.run.scene.name);
     this.sessions = [...this.sessions, session];
     this.activeKey = session.key;
     this.#deliver(session);

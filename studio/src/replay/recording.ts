@@ -1,0 +1,189 @@
+/** A recorded run of a replay: its frames by number, events, samples and inspections, read when they are needed. */
+
+import { bodyKey } from "../format";
+import type {
+  BodyId,
+  BodyTable,
+  ReplayEvents,
+  ReplayInspection,
+  ReplayRun,
+  ReplaySpan,
+  ReplyBody,
+  RunEvent,
+} from "../protocol";
+import { decodeChunk, type FrameColumns } from "./chunk";
+import type { Parts } from "./parts";
+
+/** Number of decoded parts that are kept: a seek within them is immediate. */
+const MAX_KEPT_PARTS = 6;
+
+type Metrics = Extract<ReplyBody, { is: "metrics" }>;
+
+/** Keeps the last parts that were read. */
+class PartCache<T> {
+  readonly #kept = new Map<number, Promise<T>>();
+  readonly #read: (part: number) => Promise<T>;
+
+  constructor(read: (part: number) => Promise<T>) {
+    this.#read = read;
+  }
+
+  get(part: number): Promise<T> {
+    const known = this.#kept.get(part);
+    this.#kept.delete(part);
+    const value = known ?? this.#read(part);
+    this.#kept.set(part, value);
+    const oldest = this.#kept.keys().next().value;
+    if (this.#kept.size > MAX_KEPT_PARTS && oldest !== undefined) this.#kept.delete(oldest);
+    return value;
+  }
+}
+
+export class Recording {
+  readonly run: ReplayRun;
+  /** Number of frames. */
+  readonly count: number;
+  readonly #parts: Parts;
+  readonly #chunks: PartCache<FrameColumns[]>;
+  readonly #inspections: PartCache<Map<string, ReplayInspection>>;
+  /** The number of the first frame of each chunk. */
+  readonly #firsts: number[] = [];
+  #tables: Promise<BodyTable[]> | null = null;
+  #events: Promise<RunEvent[]> | null = null;
+  #metrics: Promise<Metrics> | null = null;
+
+  constructor(run: ReplayRun, parts: Parts) {
+    this.run = run;
+    this.#parts = parts;
+    let count = 0;
+    for (const { frames } of run.chunks) {
+      this.#firsts.push(count);
+      count += frames;
+    }
+    this.count = count;
+    const dimensions = run.scene.dimensions === 3 ? 3 : 2;
+    this.#chunks = new PartCache(async (part) => decodeChunk(await parts.bytes(part), dimensions));
+    this.#inspections = new PartCache(async (part) => byKey(await parts.json<ReplayInspection[]>(part)));
+  }
+
+  /** The cycle of a frame. */
+  cycleOf(frame: number): number {
+    let left = frame;
+    for (const [first, step, count] of this.run.cycles) {
+      if (left < count) return first + step * left;
+      left -= count;
+    }
+    throw new Error(`the replay has no frame ${frame}`);
+  }
+
+  /** The last frame that is not after a cycle; the first one for earlier cycles. */
+  frameUntil(cycle: number): number {
+    let before = 0;
+    let found = 0;
+    for (const [first, step, count] of this.run.cycles) {
+      if (cycle < first) break;
+      found = before + Math.min(count - 1, Math.floor((cycle - first) / step));
+      before += count;
+    }
+    return found;
+  }
+
+  /** The first frame that is not before a cycle; the last one for later cycles. */
+  frameFrom(cycle: number): number {
+    const frame = this.frameUntil(cycle);
+    return this.cycleOf(frame) >= cycle ? frame : Math.min(this.count - 1, frame + 1);
+  }
+
+  /** The columns of a frame; prepares those that follow. */
+  async columns(frame: number): Promise<FrameColumns> {
+    const chunk = this.#firsts.findLastIndex((first) => first <= frame);
+    const frames = await this.#chunks.get(this.run.chunks[chunk]!.part);
+    const next = this.run.chunks[chunk + 1];
+    const offset = frame - this.#firsts[chunk]!;
+    if (next && offset > frames.length / 2) void this.#chunks.get(next.part);
+    return frames[offset]!;
+  }
+
+  /** The body table with a number. */
+  async table(id: number): Promise<BodyTable> {
+    this.#tables ??= this.#parts.json<BodyTable[]>(this.run.tables);
+    return (await this.#tables)[id - 1]!;
+  }
+
+  /** The reply to the request for the scenario. */
+  source(): Promise<ReplyBody> {
+    return this.#parts.json<ReplyBody>(this.run.source);
+  }
+
+  /** The reply to a request for samples. */
+  async metrics(from: number): Promise<ReplyBody> {
+    this.#metrics ??= this.#parts.json<Metrics>(this.run.metrics);
+    const all = await this.#metrics;
+    const first = Math.min(from, all.cycles.length);
+    return { ...all, first, cycles: all.cycles.slice(first), values: all.values.map((column) => column.slice(first)) };
+  }
+
+  /** The reply to a request for the events of the cycles `from` to before `until`. */
+  async events(from: number, until: number, skip: number, limit: number): Promise<ReplyBody> {
+    this.#events ??= this.#readEvents();
+    const all = await this.#events;
+    const wanted = all.slice(
+      partitionPoint(all, (event) => event.cycle < from),
+      partitionPoint(all, (event) => event.cycle < until),
+    );
+    const entries = wanted.slice(skip, skip + limit);
+    const rest = Math.max(0, wanted.length - skip - entries.length);
+    const known_until = this.run.status.cycles_planned + 1;
+    return { is: "events", entries, left_out: rest + this.run.events_left_out, known_until };
+  }
+
+  /** The inspection of a body in a cycle, with its scans; null if the file has none. */
+  async inspection(body: BodyId, cycle: number): Promise<ReplayInspection | null> {
+    const spans = this.run.inspections.filter(({ from, until }) => from <= cycle && cycle <= until);
+    for (const { part } of spans) {
+      const found = (await this.#inspections.get(part)).get(inspectionKey(body, cycle));
+      if (found) return found;
+    }
+    return null;
+  }
+
+  async #readEvents(): Promise<RunEvent[]> {
+    const read = ({ part }: ReplaySpan): Promise<ReplayEvents> => this.#parts.json<ReplayEvents>(part);
+    const parts = await Promise.all(this.run.events.map(read));
+    return parts.flatMap(eventsOfColumns);
+  }
+}
+
+function eventsOfColumns(columns: ReplayEvents): RunEvent[] {
+  let cycle = 0;
+  return columns.cycle.map((since, i) => ({
+    cycle: (cycle += since),
+    level: columns.level[i]!,
+    kind: columns.kind[i]!,
+    body: columns.body[i]!,
+    other: columns.other[i]!,
+    at_m: columns.at_m[i]!,
+    value: columns.value[i]!,
+    unit: columns.unit[i]!,
+    text: columns.text[i]!,
+  }));
+}
+
+function inspectionKey(body: BodyId, cycle: number): string {
+  return `${cycle} ${bodyKey(body)}`;
+}
+
+function byKey(items: ReplayInspection[]): Map<string, ReplayInspection> {
+  return new Map(items.map((item) => [inspectionKey(item.inspection.body, item.inspection.cycle), item]));
+}
+
+/** The number of first items for which a condition holds, which holds for none after them. */
+function partitionPoint<T>(items: readonly T[], holds: (item: T) => boolean): number {
+  let [low, high] = [0, items.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (holds(items[middle]!)) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
