@@ -38,9 +38,7 @@ mod typescript;
 
 pub use edit::Edit;
 pub use fleet::{Fleet, FleetNode};
-pub use replay::{
-    ReplayChunk, ReplayEvents, ReplayFile, ReplayInspection, ReplayRun, ReplaySpan,
-};
+pub use replay::{ReplayChunk, ReplayEvents, ReplayFile, ReplayInspection, ReplayRun, ReplaySpan};
 pub use reply::{
     FileEntry, FileKind, MetricName, MetricRow, Problem, Reply, ReplyBody, ReplyResult,
     ServerNotification, SessionState, SessionStatus, SweepRun, TargetRef,

@@ -76,7 +76,8 @@ pub struct InspectionRequest {
 impl InspectionRequest {
     /// Returns the agents of a frame that are inspected in its cycle.
     pub(super) fn agents_of<'a>(&self, frame: &'a Frame) -> Vec<&'a Body> {
-        let is_in_window = |window: CycleWindow| (window.from..=window.until).contains(&frame.cycle);
+        let is_in_window =
+            |window: CycleWindow| (window.from..=window.until).contains(&frame.cycle);
         let is_due = self.cycles.map_or(!self.agents.is_empty(), is_in_window);
         if !is_due {
             return Vec::new();
@@ -166,7 +167,10 @@ mod tests {
         assert_eq!(numbers(&request(&[], Some("4:6")), 6), [0, 1, 2, 3]);
         assert_eq!(numbers(&request(&["2", "0/7"], Some("4:6")), 4), [2]);
         assert_eq!(numbers(&request(&["2"], Some("4:6")), 7), []);
-        assert_eq!(request(&["2", "0/7"], Some("4:6")).describe("robot"), "robots 2, 0/7 in cycles 4 to 6");
+        assert_eq!(
+            request(&["2", "0/7"], Some("4:6")).describe("robot"),
+            "robots 2, 0/7 in cycles 4 to 6"
+        );
         assert_eq!(request(&[], None).describe("robot"), "");
     }
 

@@ -49,7 +49,8 @@ impl ChunkBuilder {
         if frames.is_empty() {
             return None;
         }
-        let segments: Vec<&[FrameColumns]> = frames.chunk_by(FrameColumns::has_same_layout).collect();
+        let segments: Vec<&[FrameColumns]> =
+            frames.chunk_by(FrameColumns::has_same_layout).collect();
         let mut out = Vec::new();
         out.extend((segments.len() as u32).to_le_bytes());
         segments.iter().for_each(|segment| push_segment(&mut out, segment, self.finest));

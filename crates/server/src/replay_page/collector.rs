@@ -272,7 +272,8 @@ impl InspectionParts {
     ) -> Result<(), Error> {
         if self.count == MAX_INSPECTIONS {
             let cause = format!("there would be more than {MAX_INSPECTIONS} inspections");
-            let remedy = "name fewer agents with --agents, or fewer cycles with --cycles or --every";
+            let remedy =
+                "name fewer agents with --agents, or fewer cycles with --cycles or --every";
             return Err(InputError::new("--to page", cause, remedy).into());
         }
         self.count += 1;

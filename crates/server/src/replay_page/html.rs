@@ -83,7 +83,11 @@ mod tests {
         let (policy, _) = after.split_once('"').expect("its end");
         assert!(policy.starts_with("default-src 'none'; script-src 'sha256-"), "{policy}");
         assert!(!policy.contains("unsafe") && !policy.contains("http") && !policy.contains('*'));
-        assert!(policy.contains(&source_of("1;")) && !text.contains("http://") && !text.contains("https://"));
+        assert!(
+            policy.contains(&source_of("1;"))
+                && !text.contains("http://")
+                && !text.contains("https://")
+        );
         assert!(text.find("Content-Security-Policy") < text.find("<style>"));
     }
 }

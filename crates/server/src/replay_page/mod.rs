@@ -68,6 +68,31 @@ pub fn export_page(
 ) -> Result<PageResult, Error> {
     let files = page::entry_files().ok_or_else(no_page)?;
     let export = FrameExport::check(recorded, &request.scope, ".html", watcher)?;
+    let content = collect(worlds, recorded, request, &export)?;
+    let document = html::document(&content.title, &files, &content.parts);
+    let written = export.write(document.as_bytes(), content.is_confirmed)?;
+    let ReplayContent { frames, every, inspections, events_left_out, .. } = content;
+    Ok(PageResult { written, frames, every, inspections, events_left_out })
+}
+
+/// All of a replay but the page.
+struct ReplayContent {
+    title: String,
+    parts: String,
+    is_confirmed: bool,
+    frames: u64,
+    every: Cycle,
+    inspections: usize,
+    events_left_out: u64,
+}
+
+/// Computes the run again, and collects what the page will ask for.
+fn collect(
+    worlds: &Worlds,
+    recorded: &RecordedRun,
+    request: &PageRequest<'_>,
+    export: &FrameExport<'_>,
+) -> Result<ReplayContent, Error> {
     let (from, until) = export.cycles();
     let cycles = until - from;
     let every = request.scope.every.unwrap_or_else(|| cycles.div_ceil(MAX_FRAMES).max(1));
@@ -94,9 +119,7 @@ pub fn export_page(
     let program = format!("sidestep {}", worlds.build());
     let file = ReplayFile { version: VERSION, program, runs: vec![replay] };
     let parts = collector.parts.into_text(&file)?;
-    let document = html::document(&title, &files, &parts);
-    let written = export.write(document.as_bytes(), is_confirmed)?;
-    Ok(PageResult { written, frames, every, inspections, events_left_out })
+    Ok(ReplayContent { title, parts, is_confirmed, frames, every, inspections, events_left_out })
 }
 
 /// Returns the name of a recording, without its folder.

@@ -30,8 +30,7 @@ impl Parts {
         self.bytes += line.len();
         if self.bytes > MAX_BYTES {
             let cause = format!("the file would have more than {} MiB", MAX_BYTES >> 20);
-            let remedy =
-                "export fewer frames with --every 10, or a part with --from and --until";
+            let remedy = "export fewer frames with --every 10, or a part with --from and --until";
             return Err(InputError::new("--to page", cause, remedy).into());
         }
         self.lines.push(line);

@@ -168,7 +168,8 @@ fn best_differences(own: &[&[i32]]) -> (u8, Vec<Vec<u32>>) {
 fn differences(all: &[i32], is_second: bool) -> Vec<u32> {
     let mut out = Vec::with_capacity(all.len());
     for time in 1..all.len() {
-        let slope = if is_second && time > 1 { all[time - 1].wrapping_sub(all[time - 2]) } else { 0 };
+        let slope =
+            if is_second && time > 1 { all[time - 1].wrapping_sub(all[time - 2]) } else { 0 };
         out.push(zigzag(all[time].wrapping_sub(all[time - 1]).wrapping_sub(slope)));
     }
     out
@@ -179,11 +180,15 @@ fn zigzag(number: i32) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    /// A plane as it is read back: the values of all channels at each time.
-    pub(super) fn decode(bytes: &[u8], count: usize, times: usize) -> Vec<Vec<f32>> {
+    /// A plane as it is read back: the values of all channels at each time, and its number of bytes.
+    pub(in super::super) fn decode(
+        bytes: &[u8],
+        count: usize,
+        times: usize,
+    ) -> (Vec<Vec<f32>>, usize) {
         let mut at = 1;
         let mut take = |n: usize| {
             at += n;
@@ -200,7 +205,7 @@ mod tests {
                         row[channel] = f32::from_bits(word(take(4)));
                     }
                 }
-                return out;
+                return (out, at);
             }
             1 => step = power_of_two((take(1)[0] as i8).into()),
             _ => {
@@ -227,24 +232,30 @@ mod tests {
                 let byte = |k: usize| u32::from(planes[k][channel * later + time]) << (8 * k);
                 let difference = unzigzag((0..width).map(byte).sum());
                 let last = all[time];
-                let slope = if order == 2 && time > 0 { last.wrapping_sub(all[time - 1]) } else { 0 };
+                let slope =
+                    if order == 2 && time > 0 { last.wrapping_sub(all[time - 1]) } else { 0 };
                 all.push(last.wrapping_add(slope).wrapping_add(difference));
             }
         }
         let mut owned = series.into_iter();
         let mut all: Vec<Vec<i32>> = Vec::new();
         for of in shared {
-            let one = if of == 0 { owned.next().expect("its own") } else { all[of as usize - 1].clone() };
+            let one =
+                if of == 0 { owned.next().expect("its own") } else { all[of as usize - 1].clone() };
             all.push(one);
         }
         let value = |n: i32| if list.is_empty() { n as f32 * step } else { list[n as usize] };
-        (0..times).map(|t| all.iter().map(|series| value(series[t])).collect()).collect()
+        let rows =
+            (0..times).map(|t| all.iter().map(|series| value(series[t])).collect()).collect();
+        (rows, at)
     }
 
     fn round_trip(rows: &[Vec<f32>], finest: i8) -> (u8, Vec<Vec<f32>>) {
         let values: Vec<&[f32]> = rows.iter().map(|row| &row[..]).collect();
         let bytes = encode(&values, finest);
-        (bytes[0], decode(&bytes, rows[0].len(), rows.len()))
+        let (back, used) = decode(&bytes, rows[0].len(), rows.len());
+        assert_eq!(used, bytes.len());
+        (bytes[0], back)
     }
 
     #[test]

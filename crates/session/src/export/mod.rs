@@ -152,10 +152,7 @@ struct CycleRange {
 }
 
 impl CycleRange {
-    fn from_request(
-        wanted: &ExportScope<'_>,
-        recorded: &RecordedRun,
-    ) -> Result<Self, InputError> {
+    fn from_request(wanted: &ExportScope<'_>, recorded: &RecordedRun) -> Result<Self, InputError> {
         let done = recorded.cycles_done;
         let from = wanted.from.unwrap_or(0);
         let until = wanted.until.unwrap_or(done);

@@ -1,0 +1,273 @@
+/** Replays in one file: planes and frames are read as they were written, and the socket answers as a server does. */
+
+import { deflateRawSync } from "node:zlib";
+import { expect, test, vi } from "vitest";
+import { decodeFrame } from "../../src/decode";
+import {
+  VERSION,
+  type BodyTable,
+  type ReplayFile,
+  type ReplayInspection,
+  type SessionStatus,
+} from "../../src/protocol";
+import { decodeChunk, frameBytes } from "../../src/replay/chunk";
+import { formatLink, parseLink } from "../../src/replay/link.svelte";
+import { partsOf } from "../../src/replay/parts";
+import { ByteReader, decodePlane } from "../../src/replay/plane";
+import { ReplaySocket } from "../../src/replay/socket";
+import { Studio } from "../../src/state/studio.svelte";
+
+class Bytes {
+  readonly list: number[] = [];
+
+  u8(...values: number[]): this {
+    this.list.push(...values.map((value) => value & 255));
+    return this;
+  }
+
+  u32(...values: number[]): this {
+    for (const value of values) this.u8(value, value >>> 8, value >>> 16, value >>> 24);
+    return this;
+  }
+
+  f32(...values: number[]): this {
+    return this.u8(...new Uint8Array(Float32Array.from(values).buffer));
+  }
+}
+
+const planeOf = (bytes: Bytes, channels: number, times: number): number[] => [
+  ...decodePlane(new ByteReader(Uint8Array.from(bytes.list)), channels, times),
+];
+
+test("scaled planes follow differences, lines, and channels with the same values", () => {
+  // Steps of 1/4; channel 0: 2, 3, 1; channel 1 the same; channel 2: 300, 300, 300.
+  const steps = new Bytes().u8(1, -2, 1, 1, 1).u32(0, 1, 0).u32(4, 596).u8(2, 3, 0, 0);
+  expect(planeOf(steps, 3, 3)).toEqual([0.5, 0.5, 75, 0.75, 0.75, 75, 0.25, 0.25, 75]);
+  // Second order, two bytes wide: 0, 200, 400, 601.
+  const line = new Bytes()
+    .u8(1, 0, 2, 2, 0)
+    .u32(0)
+    .u8(400 & 255, 0, 2)
+    .u8(400 >> 8, 0, 0);
+  expect(planeOf(line, 1, 4)).toEqual([0, 200, 400, 601]);
+});
+
+test("listed and raw planes are exact", () => {
+  const listed = new Bytes().u8(2).u32(2).f32(1.5, -0.1).u8(1, 1, 0).u32(0).u8(2, 1);
+  expect(planeOf(listed, 1, 3)).toEqual([1.5, Math.fround(-0.1), 1.5]);
+  expect(planeOf(new Bytes().u8(0).f32(1, 2, Infinity, 4), 2, 2)).toEqual([1, Infinity, 2, 4]);
+  expect(planeOf(new Bytes().u8(1, 0, 1, 1, 0), 0, 5)).toEqual([]);
+});
+
+/** A chunk of some frames of one body and one line, which move by a meter per frame. */
+function chunk(frames: number): Uint8Array {
+  const later = Array.from({ length: frames - 1 }, () => 2);
+  const rest = later.map(() => 0);
+  const bytes = new Bytes().u32(1).u32(1, frames, 2, 1, 2).u32(0, 2);
+  bytes.u8(1, 0, 1, 1, 0).u32(0, 0, 0, 0, 0, 0, 0, 0);
+  bytes.u8(...later, ...rest, ...rest, ...rest, ...later, ...rest, ...rest, ...rest);
+  bytes
+    .u8(1, 0, 1, 1, 0)
+    .u32(0, 0)
+    .u8(...rest, ...rest);
+  bytes
+    .u8(1, 0, 1, 1, 0)
+    .u32(0, 8)
+    .u8(...rest, ...rest);
+  return Uint8Array.from(bytes.list);
+}
+
+test("a frame is that which the server would have sent", () => {
+  const frames = decodeChunk(chunk(4), 2);
+  expect(frames.length).toBe(4);
+  const head = { session: 7, cycle: 30, time_s: 1.5, text: null };
+  const frame = decodeFrame(frameBytes(frames[3]!, head));
+  expect(frame).toMatchObject({ session: 7, tableId: 1, cycle: 30, time_s: 1.5, bodies: 2 });
+  expect([...frame.positions_m]).toEqual([3, 0, 0, 0]);
+  expect([...frame.points_m]).toEqual([3, 0, 0, 0]);
+  expect([...frame.lineStarts]).toEqual([0, 2]);
+  expect([...frame.conditions]).toEqual([0, 4]);
+});
+
+const robot = (number: number) => ({ kind: "robot", number, part: null });
+
+function replayText(): string {
+  const appearance = { color: [1, 2, 3], opacity: 1, layer: 0 };
+  const looks = Array.from({ length: 5 }, () => appearance) as unknown as BodyTable["appearances"][0];
+  const table: BodyTable = {
+    session: 0,
+    id: 1,
+    kinds: ["robot", "rope"],
+    kind: [0, 1],
+    number: [3, 0],
+    part: [-1, -1],
+    shapes: [
+      { type: "sphere", radius_m: 1 },
+      { type: "line", points_m: [], thickness_m: 0 },
+    ],
+    shape: [0, 1],
+    appearances: [looks],
+    appearance: [0, 0],
+    names: [],
+    is_agent: [true, false],
+  };
+  const status: SessionStatus = {
+    session: 0,
+    state: "paused",
+    cycle: 0,
+    cycles_planned: 30,
+    time_s: 0,
+    speed: { times: 1 },
+    cycles_per_s: 0,
+    seed: "1",
+    digest: null,
+    banner: "A recorded run.",
+    fleet: null,
+  };
+  const event = { level: "info", kind: "contact", text: "touched" };
+  const events = {
+    cycle: [3, 0, 20],
+    level: Array<string>(3).fill(event.level),
+    kind: Array<string>(3).fill(event.kind),
+    body: [robot(3), null, null],
+    other: [null, null, null],
+    at_m: [null, null, null],
+    value: [null, 2, null],
+    unit: ["", "m", ""],
+    text: Array<string>(3).fill(event.text),
+  };
+  const inspections: ReplayInspection[] = [
+    { inspection: { body: robot(3), cycle: 20, title: "robot 3", sections: [], marks: [] }, scans: [] },
+  ];
+  const names = [{ key: "trips", label: "trips", unit: "" }];
+  const metrics = { is: "metrics", names, first: 0, thinned: 0, cycles: [0, 20, 30], values: [[0, 1, 2]] };
+  const file: ReplayFile = {
+    version: VERSION,
+    program: "sidestep",
+    runs: [
+      {
+        name: "run",
+        scene: {
+          name: "</script>",
+          world: "robots",
+          agent: "robot",
+          dimensions: 2,
+          cycle_s: 0.1,
+          floor: null,
+          bodies: [],
+          is_recording: true,
+        },
+        status,
+        digest: "abc",
+        cycles: [[0, 10, 4]],
+        tables: 1,
+        source: 2,
+        metrics: 3,
+        chunks: [{ part: 4, frames: 4 }],
+        events: [{ part: 5, from: 3, until: 23, count: 3 }],
+        events_left_out: 4,
+        inspections: [{ part: 6, from: 20, until: 20, count: 1 }],
+        inspected: "robot 3 in cycles 20 to 20",
+      },
+    ],
+  };
+  const source = { is: "source", place: "scenario.toml", text: "a = 1", read_only: true };
+  const parts = [file, [table], source, metrics, chunk(4), events, inspections];
+  const packed = parts.map((part) => (part instanceof Uint8Array ? part : Buffer.from(JSON.stringify(part))));
+  return packed.map((part) => deflateRawSync(part).toString("base64")).join("\n");
+}
+
+async function opened(): Promise<Studio> {
+  const studio = new Studio({
+    open: () => new ReplaySocket(partsOf(replayText())),
+    after: () => undefined,
+    cancel: () => undefined,
+    accessStatus: () => Promise.resolve("in"),
+    isReplay: true,
+  });
+  studio.connect();
+  await vi.waitUntil(() => studio.active?.frames.newest);
+  return studio;
+}
+
+test("a replay opens by itself and goes to recorded cycles alone", async () => {
+  const studio = await opened();
+  const session = studio.active!;
+  expect([session.run.scene.name, session.run.lastCycle, session.folder]).toEqual(["</script>", 30, null]);
+  expect(session.frames.newest?.cycle).toBe(0);
+  expect(await session.playback.seekTo(27)).toBe(true);
+  session.frames.credit.refill();
+  expect((await session.frames.waitForCycle(20))?.positions_m[0]).toBe(2);
+  session.playback.step(1);
+  session.frames.credit.refill();
+  expect(await session.frames.waitForCycle(30)).not.toBeNull();
+  await vi.waitUntil(() => session.run.status.state === "over");
+  expect(session.run.status.digest).toBe("abc");
+  studio.close(session);
+});
+
+test("while somebody scrubs, a frame comes for each seek", async () => {
+  const session = (await opened()).active!;
+  const shown: number[] = [];
+  session.frames.subscribe(() => {
+    shown.push(session.frames.newest!.cycle);
+    session.frames.credit.refill();
+  });
+  session.frames.credit.refill();
+  for (const cycle of [30, 10, 20]) expect(await session.playback.seekTo(cycle)).toBe(true);
+  await vi.waitUntil(() => shown.at(-1) === 20 && session.run.status.state === "paused");
+  expect(session.run.status.cycle).toBe(20);
+});
+
+test("playing reaches the end, and pausing stays where it is", async () => {
+  const session = (await opened()).active!;
+  session.frames.subscribe(() => session.frames.credit.refill());
+  session.frames.credit.refill();
+  session.playback.setSpeed({ times: 10 });
+  session.playback.play();
+  await vi.waitUntil(() => session.run.status.state === "over");
+  expect(session.run.status.cycle).toBe(30);
+  await session.playback.seekTo(0);
+  session.playback.pause();
+  await vi.waitUntil(() => session.run.status.state === "paused");
+  expect(session.run.status.cycle).toBe(0);
+});
+
+test("events, samples, text and inspections are those of the file", async () => {
+  const session = (await opened()).active!;
+  const events = await session.client.request({ do: "events", from: 3, until: 31, skip: 1, limit: 1 });
+  expect(events).toMatchObject({ is: "events", left_out: 5, known_until: 31 });
+  if (events.is === "events") expect(events.entries).toMatchObject([{ cycle: 3, value: 2, unit: "m", body: null }]);
+  const later = await session.client.request({ do: "events", from: 4, until: 31, skip: null, limit: 9 });
+  if (later.is === "events") expect(later.entries).toMatchObject([{ cycle: 23, kind: "contact" }]);
+  const metrics = await session.client.request({ do: "metrics", from: 1 });
+  expect(metrics).toMatchObject({ first: 1, cycles: [20, 30], values: [[1, 2]] });
+  expect(await session.client.source()).toMatchObject({ text: "a = 1" });
+  const inspect = () => session.client.request({ do: "inspect", body: robot(3) });
+  await expect(inspect()).rejects.toMatchObject({ problem: { remedy: expect.stringContaining("cycles 20 to 20") } });
+  await session.playback.seekTo(20);
+  expect(await inspect()).toMatchObject({ is: "inspection", title: "robot 3" });
+  await expect(session.client.request({ do: "restart", seed: null, text: null })).rejects.toThrow("only shown");
+});
+
+test("a damaged file says so and opens nothing", async () => {
+  const studio = new Studio({
+    open: () => new ReplaySocket(partsOf("AAAA\nAAAA")),
+    after: () => undefined,
+    cancel: () => undefined,
+    accessStatus: () => Promise.resolve("in"),
+    isReplay: true,
+  });
+  studio.connect();
+  await vi.waitUntil(() => studio.problems.length > 0);
+  expect(studio.problems[0]!.problem.remedy).toBe("get the file again");
+  expect(studio.sessions).toEqual([]);
+});
+
+test("links hold a cycle and an agent", () => {
+  expect(parseLink("#cycle=1234&agent=8")).toEqual({ cycle: 1234, agent: "8" });
+  expect(parseLink("#agent=0/17&cycle=-2")).toEqual({ cycle: null, agent: "0/17" });
+  expect(formatLink({ cycle: 5, agent: "chain/0/17" })).toBe("cycle=5&agent=chain/0/17");
+  expect(formatLink({ cycle: null, agent: "a&b" })).toBe("agent=a%26b");
+  expect(parseLink("")).toEqual({ cycle: null, agent: null });
+});
