@@ -1032,6 +1032,10 @@ status: SessionStatus,
  */
 digest: string | null,
 /**
+ * The part with the digest of each frame, 16 bytes, by which two runs are compared; none of a single run.
+ */
+digests: number | null,
+/**
  * The cycles of the frames: first cycle, cycles between two frames, number of frames.
  */
 cycles: Array<[number, number, number]>,

@@ -63,11 +63,11 @@ export function followLink(studio: Studio): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
 
   /** Goes to the requested cycle; the agent is selected once its body is known. */
-  function go(session: Session): void {
+  function go(): void {
     if (requested === null) return;
     const { cycle } = requested;
     requested = { ...requested, cycle: null };
-    if (cycle !== null) session.playback.seek(cycle);
+    if (cycle !== null) studio.seek(cycle);
   }
 
   function selectAgent(session: Session, bodies: Bodies): void {
@@ -85,8 +85,8 @@ export function followLink(studio: Studio): void {
 
   $effect.root(() => {
     $effect(() => {
-      const session = studio.active;
-      if (session) untrack(() => go(session));
+      const isOpen = studio.hello !== null && studio.sessions.length === studio.hello.open.length;
+      if (isOpen && studio.active) untrack(go);
     });
     $effect(() => {
       const session = studio.active;
@@ -102,7 +102,7 @@ export function followLink(studio: Studio): void {
     requested = parseLink(location.hash);
     const session = studio.active;
     if (!session) return;
-    go(session);
+    go();
     if (session.frames.bodies) selectAgent(session, session.frames.bodies);
   });
 }

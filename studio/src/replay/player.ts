@@ -118,7 +118,9 @@ export class ReplayPlayer {
 
   #status(cycles_per_s: number): SessionStatus {
     const { run } = this.#recording;
-    const digest = this.#state === "over" ? run.digest : null;
+    const isPaused = this.#state === "paused" || this.#state === "over";
+    const own = this.#state === "over" ? run.digest : null;
+    const digest = isPaused ? (own ?? this.#recording.digestOf(this.#frame)) : null;
     const time_s = this.#cycle * run.scene.cycle_s;
     const { cycles_planned, seed, banner } = run.status;
     return {
@@ -192,9 +194,12 @@ export class ReplayPlayer {
       throw refusal(`cycle ${this.#recording.cycleOf(frame)}`, "replaced by another request", "ask again to go there");
     }
     this.#show(frame, false);
-    // The reply comes before the frame: the page tells by it that the frame follows no other. While somebody scrubs, the
-    // next seek comes before the frame, which is sent nevertheless.
-    setTimeout(() => (command === this.#commands ? this.#rest() : void this.#send()), 0);
+    this.#state = this.#isAtEnd ? "over" : "paused";
+    this.#isStale = true;
+    // The page learns the cycle before the reply, and gets the frame after it: it tells by the reply that the frame
+    // follows no other. While somebody scrubs, the next seek comes before the frame, which is sent nevertheless.
+    this.#report();
+    setTimeout(() => void this.#send(), 0);
   }
 
   #show(frame: number, sends = true): void {

@@ -17,6 +17,9 @@ import type { Parts } from "./parts";
 /** Number of decoded parts that are kept: a seek within them is immediate. */
 const MAX_KEPT_PARTS = 6;
 
+/** Size of the digest of a frame. */
+const DIGEST_BYTES = 16;
+
 type Metrics = Extract<ReplyBody, { is: "metrics" }>;
 
 /** Keeps the last parts that were read. */
@@ -48,6 +51,8 @@ export class Recording {
   readonly #inspections: PartCache<Map<string, ReplayInspection>>;
   /** The number of the first frame of each chunk. */
   readonly #firsts: number[] = [];
+  /** Digests of all frames; none of a run that is shown alone. */
+  #digests: Uint8Array | null = null;
   #tables: Promise<BodyTable[]> | null = null;
   #events: Promise<RunEvent[]> | null = null;
   #metrics: Promise<Metrics> | null = null;
@@ -64,6 +69,17 @@ export class Recording {
     const dimensions = run.scene.dimensions === 3 ? 3 : 2;
     this.#chunks = new PartCache(async (part) => decodeChunk(await parts.bytes(part), dimensions));
     this.#inspections = new PartCache(async (part) => byKey(await parts.json<ReplayInspection[]>(part)));
+  }
+
+  /** Reads what has to be known of each frame at once. */
+  async prepare(): Promise<void> {
+    if (this.run.digests !== null) this.#digests = await this.#parts.bytes(this.run.digests);
+  }
+
+  /** The digest of the state at a frame, in hexadecimal digits; null where the file has none. */
+  digestOf(frame: number): string | null {
+    const bytes = this.#digests?.subarray(DIGEST_BYTES * frame, DIGEST_BYTES * (frame + 1));
+    return bytes ? [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("") : null;
   }
 
   /** The cycle of a frame. */

@@ -76,7 +76,9 @@ export class ReplaySocket implements Socket, Outbox {
     if (!run) {
       throw new RequestError(makeProblem("replay", "the file has nothing else to open", "use the studio for it"));
     }
-    const player = new ReplayPlayer(++this.#sessions, new Recording(run, this.#parts), this);
+    const recording = new Recording(run, this.#parts);
+    await recording.prepare();
+    const player = new ReplayPlayer(++this.#sessions, recording, this);
     this.#players.set(this.#sessions, player);
     return player.opened();
   }

@@ -260,8 +260,14 @@ export class Viewport {
     this.requestDraw();
   }
 
-  /** The image as shown, with its text. */
+  /** The image as shown, with its text, as PNG. */
   snapshot(): Promise<Blob | null> {
+    const canvas = this.compose();
+    return new Promise((then) => canvas.toBlob(then, "image/png"));
+  }
+
+  /** The image as shown, with its text, drawn now. */
+  compose(): HTMLCanvasElement {
     // The browser clears the drawing buffer once it has shown it.
     cancelAnimationFrame(this.#request);
     this.#draw();
@@ -271,7 +277,7 @@ export class Viewport {
     const pen = canvas.getContext("2d")!;
     pen.drawImage(picture, 0, 0);
     pen.drawImage(this.#overlay.canvas, 0, 0, canvas.width, canvas.height);
-    return new Promise((then) => canvas.toBlob(then, "image/png"));
+    return canvas;
   }
 
   /** Returns the position of a body in the shown frame. */

@@ -95,7 +95,9 @@ export class Playback {
     if (!(await this.#seeker.seekTo(cycle))) return null;
     return this.#waiters.waitFor(() => {
       const { state, digest, cycle: at } = this.#run.status;
-      const isReached = (state === "paused" && at === cycle) || (state === "over" && at <= cycle);
+      // A replay may have only some of the cycles, and goes to the last one before.
+      const isThere = at === cycle || (this.#client.isReplay && at <= cycle);
+      const isReached = (state === "paused" && isThere) || (state === "over" && at <= cycle);
       return isReached ? { cycle: at, digest } : null;
     });
   }

@@ -288,7 +288,15 @@ export class Studio {
     this.isConnected = true;
     this.banner = null;
     if (this.sessions.length > 0) await this.#reopen(generation);
-    else if (isFirst) for (const target of hello.open) await this.#openTarget(target);
+    else if (isFirst) await this.#openAll(hello.open);
+  }
+
+  /** Opens what the page is started with; runs of a replay are there to be compared. */
+  async #openAll(targets: readonly TargetRef[]): Promise<void> {
+    for (const target of targets) await this.#openTarget(target);
+    if (!this.isReplay || this.sessions.length < 2) return;
+    this.activeKey = this.sessions[0]!.key;
+    this.sideBySide = this.inStep = true;
   }
 
   /** Opens a target of the command line. */

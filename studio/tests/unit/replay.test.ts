@@ -159,6 +159,7 @@ function replayText(): string {
         },
         status,
         digest: "abc",
+        digests: null,
         cycles: [[0, 10, 4]],
         tables: 1,
         source: 2,

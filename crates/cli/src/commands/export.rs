@@ -32,6 +32,7 @@ Examples:
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
   sidestep export runs/office --to page             one file for any browser
   sidestep export runs/office --to page --agents 1,8 --cycles 200:400
+  sidestep export runs/a --to page --beside runs/b
 
 Tables are copied from the run folder; those of a flight in real time come with a file that says \
 which cycles were flown and which simulated. Everything else is computed again from the recorded \
@@ -154,6 +155,10 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "A:B")]
     cycles: Option<CycleWindow>,
 
+    /// Another recorded run, shown beside it, with their first difference (page)
+    #[arg(long, value_name = "DIR|FILE")]
+    beside: Option<PathBuf>,
+
     #[command(flatten)]
     workers: WorkersArg,
 
@@ -168,8 +173,11 @@ pub(crate) struct ExportArgs {
 pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Failure> {
     check_options(args)?;
     let recorded = RecordedRun::open(worlds(), &args.recorded)?;
+    let beside = args.beside.as_ref().map(|path| RecordedRun::open(worlds(), path)).transpose()?;
     interrupt::listen()?;
-    if let Some(warning) = incomplete_warning(&recorded) {
+    for warning in
+        [Some(&recorded), beside.as_ref()].into_iter().flatten().filter_map(incomplete_warning)
+    {
         console.warn(&warning);
     }
     let watcher = ConsoleWatcher::new(console);
@@ -178,7 +186,8 @@ pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Fa
             let request = ExportRequest { form, scope: export_scope(args) };
             export::export(&recorded, &request, &watcher).map(Exported::from)
         }
-        None => export_page(worlds(), &recorded, &page_request(args), &watcher).map(Exported::from),
+        None => export_page(worlds(), &recorded, &page_request(args, beside.as_ref()), &watcher)
+            .map(Exported::from),
     };
     match result {
         Err(Failure::Interrupted) => Ok(ExitCode::Interrupted),
@@ -282,9 +291,9 @@ fn export_scope(args: &ExportArgs) -> ExportScope<'_> {
     }
 }
 
-fn page_request(args: &ExportArgs) -> PageRequest<'_> {
+fn page_request<'a>(args: &'a ExportArgs, beside: Option<&'a RecordedRun>) -> PageRequest<'a> {
     let inspections = InspectionRequest { agents: args.agents.clone(), cycles: args.cycles };
-    PageRequest { scope: export_scope(args), inspections }
+    PageRequest { scope: export_scope(args), inspections, beside }
 }
 
 /// Refuses options that have no effect on the chosen format.
@@ -298,6 +307,7 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
         ("--table", args.table.is_some(), format.is_table()),
         ("--agents", !args.agents.is_empty(), format == ExportFormat::Page),
         ("--cycles", args.cycles.is_some(), format == ExportFormat::Page),
+        ("--beside", args.beside.is_some(), format == ExportFormat::Page),
         ("--fps", args.fps.is_some(), format.is_animation()),
         ("--width", args.width.is_some(), format.is_animation() || format == ExportFormat::Png),
     ];

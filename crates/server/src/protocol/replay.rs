@@ -31,6 +31,8 @@ pub struct ReplayRun {
     pub status: SessionStatus,
     /// Digest of the state at the last frame; none if the run ends later.
     pub digest: Option<String>,
+    /// The part with the digest of each frame, 16 bytes, by which two runs are compared; none of a single run.
+    pub digests: Option<u32>,
     /// The cycles of the frames: first cycle, cycles between two frames, number of frames.
     pub cycles: Vec<[f64; 3]>,
     /// The part with all body tables, in the order of their numbers from 1 on.

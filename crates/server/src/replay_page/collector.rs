@@ -13,7 +13,6 @@ use crate::protocol::{
 use crate::samples::MetricSamples;
 use sidestep_kernel::view::{Body, Frame, FrameOptions, ScanSelection, Scenery};
 use sidestep_kernel::{Cycle, InputError, Simulation};
-use sidestep_scenario::MetricInfo;
 use sidestep_session::{Error, FrameSink};
 use std::time::Duration;
 
@@ -28,10 +27,9 @@ const INSPECTIONS_PART_BYTES: usize = 1 << 20;
 
 /// The frames, events, samples and inspections of a run, so far.
 pub(super) struct ReplayCollector<'a> {
-    pub(super) parts: Parts,
-    every: Cycle,
+    parts: &'a mut Parts,
+    options: &'a ReplayOptions<'a>,
     sample_every: Cycle,
-    request: &'a InspectionRequest,
     scenery: Scenery,
     encoder: FrameEncoder,
     /// Made with the first frame, which tells how large the scene is.
@@ -43,6 +41,17 @@ pub(super) struct ReplayCollector<'a> {
     log: EventStore,
     samples: MetricSamples,
     inspections: InspectionParts,
+    /// Digests of the states of all frames, if they are kept.
+    digests: Vec<u8>,
+}
+
+/// What a replay holds of each of its runs.
+pub(super) struct ReplayOptions<'a> {
+    /// Number of cycles between two frames.
+    pub(super) every: Cycle,
+    /// Whether it has the digest of each frame, by which two runs are compared.
+    pub(super) has_digests: bool,
+    pub(super) inspections: &'a InspectionRequest,
 }
 
 /// What a replay says about itself beside the run.
@@ -55,21 +64,19 @@ pub(super) struct ReplayOrigin {
 }
 
 impl<'a> ReplayCollector<'a> {
-    /// Returns a collector for a run at the first of some cycles, with a frame every `every` cycles.
+    /// Returns a collector for a run at the first of some cycles, which takes samples of its metrics.
     pub(super) fn new(
         run: &mut dyn Simulation,
-        cycles: Cycle,
-        every: Cycle,
-        request: &'a InspectionRequest,
-        infos: &'static [MetricInfo],
+        (cycles, samples): (Cycle, MetricSamples),
+        options: &'a ReplayOptions<'a>,
+        parts: &'a mut Parts,
     ) -> Self {
         run.enable_events();
         let scenery = run.scenery();
         Self {
-            parts: Parts::default(),
-            every,
-            sample_every: cycles.div_ceil(SAMPLES).max(1).next_multiple_of(every),
-            request,
+            parts,
+            options,
+            sample_every: cycles.div_ceil(SAMPLES).max(1).next_multiple_of(options.every),
             encoder: FrameEncoder::new(0, &scenery),
             scenery,
             chunk: None,
@@ -77,14 +84,10 @@ impl<'a> ReplayCollector<'a> {
             cycles: Vec::new(),
             tables: Vec::new(),
             log: EventStore::default(),
-            samples: MetricSamples::new(infos),
+            samples,
             inspections: InspectionParts::default(),
+            digests: Vec::new(),
         }
-    }
-
-    /// Returns the number of frames.
-    pub(super) fn frame_count(&self) -> u64 {
-        self.cycles.iter().map(|[_, _, count]| count).sum()
     }
 
     /// Returns the number of inspections.
@@ -108,12 +111,17 @@ impl<'a> ReplayCollector<'a> {
         let place = "scenario.toml".to_string();
         let source = ReplyBody::Source { place, text: origin.scenario, read_only: true };
         let (events, events_left_out) = self.push_events()?;
-        self.inspections.flush(&mut self.parts)?;
+        self.inspections.flush(self.parts)?;
+        let mut digests = None;
+        if self.options.has_digests {
+            digests = Some(self.parts.push(&self.digests)?);
+        }
         Ok(ReplayRun {
             name: origin.name,
             scene,
             status,
             digest: origin.digest,
+            digests,
             cycles: self.cycles.iter().map(|run| run.map(|n| n as f64)).collect(),
             tables: self.parts.push_json(&self.tables)?,
             source: self.parts.push_json(&source)?,
@@ -122,7 +130,7 @@ impl<'a> ReplayCollector<'a> {
             events,
             events_left_out,
             inspections: std::mem::take(&mut self.inspections.spans),
-            inspected: self.request.describe(run.agent_noun()),
+            inspected: self.options.inspections.describe(run.agent_noun()),
         })
     }
 
@@ -175,7 +183,7 @@ impl<'a> ReplayCollector<'a> {
     }
 
     fn push_inspections(&mut self, run: &mut dyn Simulation, frame: &Frame) -> Result<(), Error> {
-        let inspected: Vec<&Body> = self.request.agents_of(frame);
+        let inspected: Vec<&Body> = self.options.inspections.agents_of(frame);
         if inspected.is_empty() {
             return Ok(());
         }
@@ -186,7 +194,7 @@ impl<'a> ReplayCollector<'a> {
             let Some(inspection) = run.inspect(id) else { continue };
             let own = scans.iter().filter(|scan| scan.of == id);
             let item = ReplayInspection { inspection, scans: own.map(scan).collect() };
-            self.inspections.push(frame.cycle, &item, &mut self.parts)?;
+            self.inspections.push(frame.cycle, &item, self.parts)?;
         }
         Ok(())
     }
@@ -212,7 +220,7 @@ impl<'a> ReplayCollector<'a> {
 
 impl FrameSink for ReplayCollector<'_> {
     fn interval(&self) -> Cycle {
-        self.every
+        self.options.every
     }
 
     fn capture(&mut self, run: &mut dyn Simulation) -> Result<(), Error> {
@@ -226,6 +234,9 @@ impl FrameSink for ReplayCollector<'_> {
         }
         self.add_cycle(cycle);
         self.push_frame(&frame)?;
+        if self.options.has_digests {
+            self.digests.extend(run.digest().as_bytes());
+        }
         if cycle.is_multiple_of(self.sample_every) || self.samples.is_empty() {
             self.samples.push(cycle, &run.metrics(), Duration::ZERO);
         }

@@ -20,13 +20,15 @@ mod tests;
 pub use agents::{AgentNumber, CycleWindow, InspectionRequest};
 
 use crate::page;
-use crate::protocol::{ReplayFile, VERSION};
-use collector::{ReplayCollector, ReplayOrigin};
+use crate::protocol::{ReplayFile, ReplayRun, VERSION};
+use crate::samples::MetricSamples;
+use collector::{ReplayCollector, ReplayOptions, ReplayOrigin};
+use parts::Parts;
 use sidestep_kernel::text::group_thousands;
 use sidestep_kernel::view::FrameOptions;
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_scenario::Worlds;
-use sidestep_session::export::{ExportResult, ExportScope, FrameExport};
+use sidestep_session::export::{ExportFile, ExportResult, ExportScope, FrameSource};
 use sidestep_session::{Error, RecordedRun, Watcher};
 use std::path::Path;
 
@@ -39,6 +41,8 @@ pub struct PageRequest<'a> {
     pub scope: ExportScope<'a>,
     /// The inspections that the file holds.
     pub inspections: InspectionRequest,
+    /// Another recorded run, which is shown beside it.
+    pub beside: Option<&'a RecordedRun>,
 }
 
 /// The file that was written, and what is in it.
@@ -67,10 +71,14 @@ pub fn export_page(
     watcher: &dyn Watcher,
 ) -> Result<PageResult, Error> {
     let files = page::entry_files().ok_or_else(no_page)?;
-    let export = FrameExport::check(recorded, &request.scope, ".html", watcher)?;
-    let content = collect(worlds, recorded, request, &export)?;
+    let mut sources = vec![FrameSource::check(recorded, &request.scope, watcher)?];
+    let file = ExportFile::check(&sources[0], ".html")?;
+    if let Some(other) = request.beside {
+        sources.push(FrameSource::check(other, &request.scope, watcher)?);
+    }
+    let content = collect(worlds, request, &sources)?;
     let document = html::document(&content.title, &files, &content.parts);
-    let written = export.write(document.as_bytes(), content.is_confirmed)?;
+    let written = file.write(document.as_bytes(), content.is_confirmed)?;
     let ReplayContent { frames, every, inspections, events_left_out, .. } = content;
     Ok(PageResult { written, frames, every, inspections, events_left_out })
 }
@@ -79,6 +87,7 @@ pub fn export_page(
 struct ReplayContent {
     title: String,
     parts: String,
+    /// Whether the ends of all runs have the recorded digests.
     is_confirmed: bool,
     frames: u64,
     every: Cycle,
@@ -86,40 +95,96 @@ struct ReplayContent {
     events_left_out: u64,
 }
 
-/// Computes the run again, and collects what the page will ask for.
+/// Computes some runs again, and collects what the page will ask for.
 fn collect(
     worlds: &Worlds,
-    recorded: &RecordedRun,
     request: &PageRequest<'_>,
-    export: &FrameExport<'_>,
+    sources: &[FrameSource<'_>],
 ) -> Result<ReplayContent, Error> {
-    let (from, until) = export.cycles();
-    let cycles = until - from;
-    let every = request.scope.every.unwrap_or_else(|| cycles.div_ceil(MAX_FRAMES).max(1));
-    let mut run = export.start()?;
-    request.inspections.check(&run.frame(FrameOptions::WITHOUT_SCANS), (from, until))?;
+    let length = |source: &FrameSource<'_>| {
+        let (from, until) = source.cycles();
+        until - from
+    };
+    let longest = sources.iter().map(length).max().unwrap_or(0);
+    let every = request.scope.every.unwrap_or_else(|| longest.div_ceil(MAX_FRAMES).max(1));
+    let has_digests = sources.len() > 1;
+    let options = ReplayOptions { every, has_digests, inspections: &request.inspections };
+    let mut parts = Parts::default();
+    let mut runs = Vec::with_capacity(sources.len());
+    let mut content = ReplayContent {
+        title: String::new(),
+        parts: String::new(),
+        is_confirmed: true,
+        frames: 0,
+        every,
+        inspections: 0,
+        events_left_out: 0,
+    };
+    for source in sources {
+        let replay = collect_run(worlds, source, &options, &mut parts)?;
+        content.is_confirmed &= replay.is_confirmed;
+        content.frames +=
+            replay.run.chunks.iter().map(|chunk| u64::from(chunk.frames)).sum::<u64>();
+        content.inspections += replay.inspections;
+        content.events_left_out += replay.run.events_left_out;
+        runs.push(replay.run);
+    }
+    distinguish(&mut runs);
+    let names: Vec<&str> = runs.iter().map(displayed_name).collect();
+    content.title = format!("{} · Sidestep replay", names.join(", "));
+    let program = format!("sidestep {}", worlds.build());
+    let file = ReplayFile { version: VERSION, program, runs };
+    content.parts = parts.into_text(&file)?;
+    Ok(content)
+}
+
+/// A run of a replay, and what the command tells of it.
+struct CollectedRun {
+    run: ReplayRun,
+    is_confirmed: bool,
+    inspections: usize,
+}
+
+fn collect_run(
+    worlds: &Worlds,
+    source: &FrameSource<'_>,
+    options: &ReplayOptions<'_>,
+    parts: &mut Parts,
+) -> Result<CollectedRun, Error> {
+    let recorded = source.recorded();
+    let (from, until) = source.cycles();
+    let mut run = source.start()?;
+    let first = run.frame(FrameOptions::WITHOUT_SCANS);
+    options.inspections.check(&first, (from, until))?;
     let world_type = worlds.find(run.world_name());
     let infos = world_type.map_or(&[][..], |world_type| world_type.metric_infos());
-    let mut collector =
-        ReplayCollector::new(run.as_mut(), cycles, every, &request.inspections, infos);
-    let is_confirmed = export.drive(run.as_mut(), &mut collector)?;
+    let samples = MetricSamples::new(infos);
+    let mut collector = ReplayCollector::new(run.as_mut(), (until - from, samples), options, parts);
+    let is_confirmed = source.drive(run.as_mut(), &mut collector)?;
     let last = run.cycle();
     let is_end = last == recorded.cycles_done;
     let origin = ReplayOrigin {
         name: name_of(&recorded.path),
         scenario: recorded.resolved_scenario()?.text,
-        banner: banner((from, last), every, is_confirmed),
+        banner: banner((from, last), options.every, is_confirmed),
         digest: is_end.then(|| run.digest().to_string()),
     };
     let replay = collector.finish(run.as_mut(), origin)?;
-    let frames = collector.frame_count();
-    let inspections = collector.inspection_count();
-    let events_left_out = replay.events_left_out;
-    let title = title(&replay.scene.name, &replay.name);
-    let program = format!("sidestep {}", worlds.build());
-    let file = ReplayFile { version: VERSION, program, runs: vec![replay] };
-    let parts = collector.parts.into_text(&file)?;
-    Ok(ReplayContent { title, parts, is_confirmed, frames, every, inspections, events_left_out })
+    Ok(CollectedRun { run: replay, is_confirmed, inspections: collector.inspection_count() })
+}
+
+/// Adds the names of the recordings to those of the scenarios, where these are the same.
+fn distinguish(runs: &mut [ReplayRun]) {
+    let is_same =
+        runs.len() > 1 && runs.windows(2).all(|pair| pair[0].scene.name == pair[1].scene.name);
+    for run in runs.iter_mut().filter(|_| is_same) {
+        run.scene.name = format!("{} ({})", run.scene.name, run.name);
+    }
+}
+
+/// Returns the name of the scenario, or that of the recording where it has none.
+fn displayed_name(run: &ReplayRun) -> &str {
+    if run.scene.name.is_empty() { &run.name } else { &run.scene.name }
 }
 
 /// Returns the name of a recording, without its folder.
@@ -128,11 +193,6 @@ fn name_of(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let stem = if whole.is_file() { whole.file_stem() } else { whole.file_name() };
     stem.unwrap_or_default().to_string_lossy().into_owned()
-}
-
-fn title(scenario: &str, recording: &str) -> String {
-    let name = if scenario.is_empty() { recording } else { scenario };
-    format!("{name} · Sidestep replay")
 }
 
 /// Returns what people should know of the replay as a whole.

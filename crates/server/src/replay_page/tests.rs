@@ -38,13 +38,13 @@ fn replay(text: &str, change: impl FnOnce(&mut PageRequest<'_>)) -> Replay {
     let started = ManagedRun::start(&WORLDS, compiled.as_ref(), &source, 1, keep).expect("started");
     started.run_to_end(&NoWatcher).expect("recorded");
     let recorded = RecordedRun::open(&WORLDS, &run).expect("a recording");
-    let (out, replace, from, until, every) = (None, false, None, None, None);
-    let scope = ExportScope { out, replace, from, until, every, workers: 1 };
-    let mut request = PageRequest { scope, inspections: InspectionRequest::default() };
+    let scope =
+        ExportScope { out: None, replace: false, from: None, until: None, every: None, workers: 1 };
+    let inspections = InspectionRequest::default();
+    let mut request = PageRequest { scope, inspections, beside: None };
     change(&mut request);
-    let export =
-        FrameExport::check(&recorded, &request.scope, ".html", &NoWatcher).expect("vacant");
-    let content = collect(&WORLDS, &recorded, &request, &export).expect("collected");
+    let source = FrameSource::check(&recorded, &request.scope, &NoWatcher).expect("recorded");
+    let content = collect(&WORLDS, &request, &[source]).expect("collected");
     Replay { place: folder.path().display().to_string(), _folder: folder, content }
 }
 

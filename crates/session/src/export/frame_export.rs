@@ -1,4 +1,4 @@
-//! A file that another crate makes of the frames of a recorded run.
+//! Files that another crate makes of the frames of recorded runs.
 
 use super::target::Target;
 use super::{CycleRange, ExportContext, ExportResult, ExportScope};
@@ -7,28 +7,29 @@ use crate::{Error, FrameSink, RecordedRun, Watcher};
 use sidestep_kernel::{Cycle, Simulation};
 use std::io::Write;
 
-/// An export whose part and place were checked before anything is computed.
-pub struct FrameExport<'a> {
+/// A part of a recorded run whose frames are taken.
+pub struct FrameSource<'a> {
     job: ExportContext<'a>,
-    target: Target,
 }
 
-impl<'a> FrameExport<'a> {
-    /// Checks the part and the place: the requested file, or one beside the run with its name and `ending`.
+impl<'a> FrameSource<'a> {
+    /// Checks the part, before anything is computed.
     ///
     /// # Errors
-    /// When nothing is recorded, the part is wrong, or the file exists and may not be replaced.
+    /// When nothing is recorded, or the part is wrong.
     pub fn check(
         recorded: &'a RecordedRun,
         scope: &'a ExportScope<'a>,
-        ending: &str,
         watcher: &'a dyn Watcher,
     ) -> Result<Self, Error> {
         recorded.check_has_content()?;
         let span = CycleRange::from_request(scope, recorded)?;
-        let job = ExportContext { recorded, wanted: scope, span, watcher };
-        let target = Target::for_file(&job, ending)?;
-        Ok(Self { job, target })
+        Ok(Self { job: ExportContext { recorded, wanted: scope, span, watcher } })
+    }
+
+    /// Returns the run that was recorded.
+    pub fn recorded(&self) -> &RecordedRun {
+        self.job.recorded
     }
 
     /// Returns the first and the last cycle of the part.
@@ -52,6 +53,21 @@ impl<'a> FrameExport<'a> {
         let sinks = Sinks { frames: Some(sink), ..Sinks::default() };
         self.job.drive(run, self.job.span.until, sinks)?;
         self.job.recorded.verify_digest(run)
+    }
+}
+
+/// A file that does not exist yet, or may be replaced.
+pub struct ExportFile {
+    target: Target,
+}
+
+impl ExportFile {
+    /// Checks the place: the requested file, or one beside the run with its name and `ending`.
+    ///
+    /// # Errors
+    /// When the file exists and may not be replaced, or is the recording itself.
+    pub fn check(source: &FrameSource<'_>, ending: &str) -> Result<Self, Error> {
+        Ok(Self { target: Target::for_file(&source.job, ending)? })
     }
 
     /// Writes the file, and its list.

@@ -9,7 +9,7 @@ mod tables;
 mod target;
 mod trajectory;
 
-pub use frame_export::FrameExport;
+pub use frame_export::{ExportFile, FrameSource};
 
 use crate::driver::{Sinks, drive};
 use crate::frame_sink::{BagSink, EndReason, McapSink};
