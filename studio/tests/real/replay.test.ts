@@ -61,7 +61,7 @@ describe.skipIf(BINARY === "")("a replay in one file", () => {
     page.evaluate(() => Number(document.querySelector("[data-testid=cycle]")!.textContent!.replace(/\D/g, "")));
 
   async function seek(page: Page, cycle: number): Promise<void> {
-    await page.getByRole("slider", { name: "Cycle" }).fill(String(cycle));
+    await page.getByRole("slider", { name: "Cycle" }).fill(String(cycle), { force: true });
     await page.waitForFunction(
       (wanted) => Number(document.querySelector("[data-testid=cycle]")!.textContent!.replace(/\D/g, "")) === wanted,
       cycle,
@@ -78,6 +78,14 @@ describe.skipIf(BINARY === "")("a replay in one file", () => {
       last = next;
     }
     return last;
+  }
+
+  /** Gives the view a size of its own: around it, the studio has more buttons than a replay. */
+  async function enlarge(page: Page): Promise<void> {
+    await page.locator(".view").evaluate((view) => {
+      const look = { position: "fixed", inset: "0", width: "1000px", height: "700px", zIndex: "10" };
+      Object.assign((view as HTMLElement).style, look);
+    });
   }
 
   /** The number of pixels that differ by more than a rounding of a channel, and the largest difference of a channel. */
@@ -135,6 +143,7 @@ describe.skipIf(BINARY === "")("a replay in one file", () => {
       const studio = (await openPage(browser, program.url)).page;
       await drawn(studio);
       const { page } = await openFile(run);
+      await Promise.all([enlarge(studio), enlarge(page)]);
       const last = await page.getByRole("slider", { name: "Cycle" }).getAttribute("max");
       for (let k = 0; k < 10; k++) {
         const cycle = Math.floor(((k + 0.5) * Number(last)) / 10);
@@ -226,6 +235,53 @@ describe.skipIf(BINARY === "")("a replay in one file", () => {
       return violations;
     });
     expect(isRefused).toEqual(expect.arrayContaining(["connect-src", "img-src", "script-src-elem"]));
+    await page.context().close();
+  });
+
+  test("two runs are beside each other, and their first difference is found", async () => {
+    const other = join(folder, "other");
+    const scenario = join(SCENARIOS, "robots/crossing.toml");
+    sidestep("run", scenario, "--quiet", "--cycles", "200", "--out", join(folder, "one"));
+    const changed = ["--set", "conflict_policy=right_of_way"];
+    sidestep("run", scenario, "--quiet", "--cycles", "200", "--out", other, ...changed);
+    sidestep("export", join(folder, "one"), "--to", "page", "--quiet", "--beside", other);
+    const { page, errors } = await openFile("one");
+    await page.locator(".view").nth(1).waitFor();
+    await page.getByRole("button", { name: "First difference" }).click();
+    await page
+      .getByTestId("difference")
+      .filter({ hasText: /differ from cycle \d+ on/ })
+      .waitFor();
+    await page.screenshot({ path: "screenshots/replay-two-1280.png" });
+    expect(errors).toEqual([]);
+    await page.context().close();
+  });
+
+  test("a video has the frames of the chosen cycles", async () => {
+    const { page, errors } = await openFile("office");
+    await page.getByRole("button", { name: "Export…" }).click();
+    await page.getByLabel("from cycle").fill("20");
+    await page.getByLabel("to", { exact: true }).fill("60");
+    const download = page.waitForEvent("download");
+    await page.getByRole("button", { name: "Video (WebM)" }).click();
+    const file = await (await download).path();
+    const bytes = readFileSync(file);
+    expect(bytes.readUInt32BE(0)).toBe(0x1a45dfa3);
+    // The policy of the file plays no videos.
+    const player = await browser.newPage();
+    const [duration_s, width] = await player.evaluate(
+      async (url) => {
+        const video = document.createElement("video");
+        video.src = url;
+        await new Promise((then) => (video.onloadeddata = video.onerror = then));
+        return [video.duration, video.videoWidth];
+      },
+      `data:video/webm;base64,${bytes.toString("base64")}`,
+    );
+    expect(duration_s).toBeGreaterThan(1);
+    expect(width).toBeGreaterThan(500);
+    await player.close();
+    expect(errors).toEqual([]);
     await page.context().close();
   });
 

@@ -17,9 +17,8 @@ use crate::encode::FrameColumns;
 const MAX_VALUES: usize = 1 << 19;
 /// Maximum number of frames in a chunk, so that a seek decodes little.
 const MAX_FRAMES: usize = 512;
-/// The exponent of the step of angles and of components of quaternions: the end of a body of a thousand pixels moves by
-/// less than a hundredth of one.
-const FINEST_TURN: i8 = -18;
+/// The exponent of the step of angles and of components of quaternions: as fine as `f32` is there.
+const FINEST_TURN: i8 = -24;
 
 /// Frames that are collected until they are a chunk.
 pub(super) struct ChunkBuilder {

@@ -2,9 +2,9 @@
 
 use sidestep_kernel::view::{Body, Frame, Scenery, Shape};
 
-/// Steps of places in the size of the scene, as a power of two: where all of it fills a thousand pixels, a step is a
-/// thousandth of one.
-const STEPS_EXPONENT: i32 = 20;
+/// Steps of places in the size of the scene, as a power of two. The page draws `f32`, which has 24 bits; two more keep
+/// those that are small beside the scene. Fewer bits change single pixels, because edges are sharp.
+const STEPS_EXPONENT: i32 = 26;
 
 /// Returns the exponent of the finest step of places that matters, as a power of two in meters.
 pub(super) fn finest_step_exponent(scenery: &Scenery, first: &Frame) -> i8 {
@@ -77,8 +77,8 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_a_millionth_of_the_scene() {
-        assert_eq!([24.0, 40.0, 26_000.0].map(exponent_of_scene), [-16, -15, -6]);
-        assert_eq!([0.0, 1e9].map(exponent_of_scene), [-20, 0]);
+    fn steps_are_finer_than_what_is_drawn() {
+        assert_eq!([24.0, 40.0, 26_000.0].map(exponent_of_scene), [-22, -21, -12]);
+        assert_eq!([0.0, 1e9].map(exponent_of_scene), [-26, 0]);
     }
 }

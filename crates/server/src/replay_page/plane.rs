@@ -19,8 +19,8 @@ use std::collections::BTreeMap;
 
 /// Maximum number of different values that are listed instead of scaled: more would not be fewer bytes.
 const MAX_LISTED: usize = 1024;
-/// Maximum size of a whole number, so that its differences fit 32 bits.
-const MAX_WHOLE: f32 = (1_u32 << 29) as f32;
+/// Maximum size of a whole number in bits, so that its differences fit 32 bits.
+const MAX_WHOLE_BITS: i32 = 29;
 
 /// Returns the plane of some channels; `values` are those of all channels at each time, and `finest` is the exponent of
 /// the finest step that matters.
@@ -38,7 +38,17 @@ pub(super) fn encode(values: &[&[f32]], finest: i8) -> Vec<u8> {
     if let Some(plane) = listed_plane(values) {
         return plane;
     }
-    scaled_plane(values, finest.into()).unwrap_or_else(|| raw_plane(values))
+    let exponent = coarsest_needed(values).max(finest.into());
+    scaled_plane(values, exponent).unwrap_or_else(|| raw_plane(values))
+}
+
+/// Returns the exponent of the finest step with which all values are whole numbers of the largest size or below; `f32`
+/// is coarser there.
+fn coarsest_needed(values: &[&[f32]]) -> i32 {
+    let largest =
+        values.iter().copied().flatten().fold(0.0_f32, |most, value| most.max(value.abs()));
+    let biased = (largest.to_bits() >> 23 & 0xff) as i32;
+    biased - 126 - MAX_WHOLE_BITS
 }
 
 fn channels(values: &[&[f32]]) -> usize {
@@ -73,10 +83,11 @@ fn scaled_plane(values: &[&[f32]], exponent: i32) -> Option<Vec<u8>> {
         return None;
     }
     let step = power_of_two(exponent);
+    let max_whole = power_of_two(MAX_WHOLE_BITS);
     let mut rows = Vec::with_capacity(values.len());
     for row in values {
         let whole: Vec<f32> = row.iter().map(|value| (value / step).round()).collect();
-        if whole.iter().any(|n| n.abs() > MAX_WHOLE) {
+        if whole.iter().any(|n| n.abs() > max_whole) {
             return None;
         }
         rows.push(whole.into_iter().map(|n| n as i32).collect());
@@ -273,6 +284,17 @@ pub(super) mod tests {
         assert_eq!(mode, 1);
         for (one, other) in rows.iter().flatten().zip(back.iter().flatten()) {
             assert!((one - other).abs() <= 0.0005 + one.abs() * f32::EPSILON, "{one} {other}");
+        }
+    }
+
+    #[test]
+    fn places_far_from_the_origin_stay_whole_numbers_of_a_coarser_step() {
+        let rows: Vec<Vec<f32>> =
+            (0..2000).map(|t| vec![5.2e6 + 0.5 * t as f32, 0.1 * (t as f32).sqrt()]).collect();
+        let (mode, back) = round_trip(&rows, -20);
+        assert_eq!(mode, 1);
+        for (one, other) in rows.iter().flatten().zip(back.iter().flatten()) {
+            assert!((one - other).abs() <= 1.0 / 128.0, "{one} {other}");
         }
     }
 
