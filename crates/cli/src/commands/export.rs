@@ -7,7 +7,7 @@ use crate::interrupt;
 use crate::scenario_args::WorkersArg;
 use crate::worlds;
 use clap::{Args, ValueEnum};
-use serde_json::json;
+use serde_json::{Value, json};
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_record::origins_text;
 use sidestep_server::replay_page::{
@@ -225,6 +225,15 @@ impl From<PageResult> for Exported {
 }
 
 impl PageContent {
+    fn json(&self) -> Value {
+        json!({
+            "frames": self.frames,
+            "every": self.every,
+            "inspections": self.inspections,
+            "events_left_out": self.events_left_out,
+        })
+    }
+
     /// Returns what the page holds, and what it does not.
     fn text(&self) -> String {
         let frames = group_thousands(self.frames);
@@ -331,7 +340,11 @@ fn print_result(
     let ExportResult { paths, is_confirmed, film: animation } = written;
     let shown: Vec<String> = paths.iter().map(display_path).collect();
     let origins = &recorded.origins;
-    let json = json!({ "written": shown, "digest_confirmed": is_confirmed, "origins": origins });
+    let mut json =
+        json!({ "written": shown, "digest_confirmed": is_confirmed, "origins": origins });
+    if let Some(page) = page {
+        json["page"] = page.json();
+    }
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
     console.print_result_or_short(&json, &names, || {
         let confirmed = if *is_confirmed { "  its end has the recorded digest\n" } else { "" };

@@ -117,6 +117,32 @@ fn pictures_and_films_are_drawn() {
 }
 
 #[test]
+fn a_page_is_one_file_that_names_no_folder_and_lets_nothing_out() {
+    let place = recorded();
+    let made =
+        place.run(&["export", "r", "--to", "page", "--agents", "0", "--every", "10", "--json"]);
+    if made.err().contains("built without the studio's page") {
+        return;
+    }
+    assert_eq!(made.code(), 0, "{}", made.err());
+    let told: serde_json::Value = serde_json::from_str(&made.out()).expect("JSON");
+    assert_eq!(
+        told["page"],
+        json!({ "frames": 41, "every": 10, "inspections": 41, "events_left_out": 0 })
+    );
+    let page = place.read("r.html");
+    assert!(page.starts_with("<!doctype html>") && page.contains("default-src 'none'"));
+    let folder = place.path("").display().to_string();
+    assert!(!page.contains(folder.trim_end_matches('/')));
+    assert_eq!(place.run(&["export", "r", "--to", "page"]).code(), 2, "it is there already");
+    let beside = ["export", "r", "--to", "page", "--beside", "r.mcap", "--out", "two.html"];
+    assert_eq!(place.run(&beside).code(), 0);
+    let refused = place.run(&["export", "r", "--to", "page", "--agents", "999", "--out", "x.html"]);
+    assert!(refused.err().contains("there is no such agent"), "{}", refused.err());
+    assert!(!place.path("x.html").exists());
+}
+
+#[test]
 fn what_is_there_is_replaced_only_when_asked() {
     let place = recorded();
     place.json(&["export", "r", "--to", "csv"]);
@@ -183,7 +209,7 @@ fn wrong_exports_are_told_and_write_nothing() {
     let place = recorded();
     place.write("foreign.mcap", b"\x89MCAP0\r\nno more");
     let before = place.names();
-    let wrong: [(&[&str], &str); 8] = [
+    let wrong: [(&[&str], &str); 11] = [
         (&["nowhere", "--to", "csv"], "nowhere"),
         (&["s.toml", "--to", "csv"], "no folder"),
         (&["foreign.mcap", "--to", "gif"], "damaged"),
@@ -192,6 +218,9 @@ fn wrong_exports_are_told_and_write_nothing() {
         (&["r", "--to", "gif", "--from", "401"], "give 0 to 400"),
         (&["r", "--to", "gif", "--from", "40", "--until", "30"], "--until 30"),
         (&["r", "--to", "svg", "--fps", "10"], "--to svg"),
+        (&["r", "--to", "csv", "--agents", "1"], "--agents: means nothing for --to csv"),
+        (&["r", "--to", "page", "--agents", "x"], "`x` is no number of an agent"),
+        (&["r", "--to", "page", "--cycles", "9:3"], "before it begins"),
     ];
     for (args, word) in wrong {
         let ended = place.run(&[&["export"], args].concat());

@@ -162,11 +162,11 @@ mod tests {
         let numbers = |request: &InspectionRequest, cycle| -> Vec<u32> {
             request.agents_of(&frame(cycle)).iter().map(|body| body.number).collect()
         };
-        assert_eq!(numbers(&request(&[], None), 5), []);
+        assert_eq!(numbers(&request(&[], None), 5), [0; 0]);
         assert_eq!(numbers(&request(&["3", "1"], None), 5), [1, 3]);
         assert_eq!(numbers(&request(&[], Some("4:6")), 6), [0, 1, 2, 3]);
         assert_eq!(numbers(&request(&["2", "0/7"], Some("4:6")), 4), [2]);
-        assert_eq!(numbers(&request(&["2"], Some("4:6")), 7), []);
+        assert_eq!(numbers(&request(&["2"], Some("4:6")), 7), [0; 0]);
         assert_eq!(
             request(&["2", "0/7"], Some("4:6")).describe("robot"),
             "robots 2, 0/7 in cycles 4 to 6"

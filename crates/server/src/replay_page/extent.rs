@@ -65,7 +65,7 @@ impl Extent {
 mod tests {
     use super::*;
     use sidestep::worlds::robots::kinds::ROBOT;
-    use sidestep_kernel::view::Pose;
+    use sidestep_kernel::view::{EarthReference, Pose};
 
     fn exponent_of_scene(size_m: f64) -> i8 {
         let body = |x_m: f64| {
@@ -73,7 +73,16 @@ mod tests {
             Body::new(ROBOT, 0, Pose::from_position([x_m, 0.0, 0.0]), shape)
         };
         let frame = Frame { bodies: vec![body(-3.0), body(size_m - 3.0)], ..Frame::default() };
-        finest_step_exponent(&Scenery::default(), &frame)
+        let scenery = Scenery {
+            name: String::new(),
+            dimensions: 3,
+            cycle_s: 1.0,
+            floor: None,
+            bodies: Vec::new(),
+            names: Vec::new(),
+            earth: EarthReference::default(),
+        };
+        finest_step_exponent(&scenery, &frame)
     }
 
     #[test]

@@ -279,7 +279,7 @@ pub(super) mod tests {
     #[test]
     fn places_anywhere_are_exact_to_half_a_step() {
         let rows: Vec<Vec<f32>> =
-            (0..200).map(|t| vec![(t as f32).sqrt() * 31.7, 1e4 / (1.0 + t as f32)]).collect();
+            (0..2000).map(|t| vec![(t as f32).sqrt() * 31.7, 1e4 / (1.0 + t as f32)]).collect();
         let (mode, back) = round_trip(&rows, -10);
         assert_eq!(mode, 1);
         for (one, other) in rows.iter().flatten().zip(back.iter().flatten()) {
