@@ -30,9 +30,7 @@ Examples:
   sidestep export runs/office --to gif --from 1000 --until 2000
   sidestep export runs/office --to png --from 1234  one moment
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
-  sidestep export runs/office --to page             one file for any browser
-  sidestep export runs/office --to page --agents 1,8 --cycles 200:400
-  sidestep export runs/a --to page --beside runs/b
+  sidestep export runs/office --to page --agents 1  one file for any browser
 
 Tables are copied from the run folder; those of a flight in real time come with a file that says \
 which cycles were flown and which simulated. Everything else is computed again from the recorded \
@@ -146,12 +144,12 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(64..=4096))]
     width: Option<u16>,
 
-    /// Agents that a click shows what they perceived, decided and did (page): their numbers, with that
-    /// of a part where one is meant, e.g. 1,8 or 0/17 [default: all in the cycles of --cycles, else none]
+    /// Agents whose percepts, decisions and actions the page holds (page): their numbers, with that of
+    /// a part where one is meant, e.g. 1,8 or 0/17 [default: all in the cycles of --cycles, else none]
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     agents: Vec<AgentNumber>,
 
-    /// Cycles for which agents can be clicked (page) [default: with --agents, all]
+    /// Cycles of these percepts, decisions and actions (page) [default: with --agents, all]
     #[arg(long, value_name = "A:B")]
     cycles: Option<CycleWindow>,
 

@@ -1,7 +1,7 @@
 //! The directory of a replay in one file, from which the page answers its own requests.
 //!
-//! The file holds parts: deflated bytes as base64, one in a line. The first part is a [`ReplayFile`] as JSON; it refers to
-//! the others by their numbers. The layout of frames is in `crates/server/src/replay_page/chunk.rs`.
+//! The file holds parts: deflated bytes as base64, one in a line. The first part is a [`ReplayFile`] as JSON; it refers
+//! to the others by their numbers. The layout of frames is in `crates/server/src/replay_page/chunk.rs`.
 
 use super::{Scan, Scene, SessionStatus};
 use serde::Serialize;

@@ -1,4 +1,5 @@
-//! A recorded run as one file that any browser opens without a server: the studio's page, with all that it would ask for.
+//! A recorded run as one file that any browser opens without a server: the studio's page, with all that it would ask
+//! for.
 //!
 //! ```text
 //! collector.rs  frames, events, samples, inspections     chunk.rs, plane.rs  frames as few bytes
@@ -62,8 +63,8 @@ pub struct PageResult {
 /// Exports a recorded run as one page that needs no server.
 ///
 /// # Errors
-/// When the program has no page, the part or the place is wrong, the result cannot be stored, or the run differs from the
-/// recorded one; [`Error::Interrupted`] when the watcher asked to stop.
+/// When the program has no page, the part or the place is wrong, the result cannot be stored, or the run differs from
+/// the recorded one; [`Error::Interrupted`] when the watcher asked to stop.
 pub fn export_page(
     worlds: &Worlds,
     recorded: &RecordedRun,
