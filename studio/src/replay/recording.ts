@@ -1,4 +1,4 @@
-/** A recorded run of a replay: its frames by number, events, samples and inspections, read when they are needed. */
+/** A recorded run of a replay: its frames by number, events, metrics and inspections, read when they are needed. */
 
 import { bodyKey } from "../format";
 import type {
@@ -131,7 +131,7 @@ export class Recording {
     return this.#parts.json<ReplyBody>(this.run.source);
   }
 
-  /** The reply to a request for samples. */
+  /** The reply to a request for metrics. */
   async metrics(from: number): Promise<ReplyBody> {
     this.#metrics ??= this.#parts.json<Metrics>(this.run.metrics);
     const all = await this.#metrics;

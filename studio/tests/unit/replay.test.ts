@@ -234,7 +234,7 @@ test("playing reaches the end, and pausing stays where it is", async () => {
   expect(session.run.status.cycle).toBe(0);
 });
 
-test("events, samples, text and inspections are those of the file", async () => {
+test("events, metrics, text and inspections are those of the file", async () => {
   const session = (await opened()).active!;
   const events = await session.client.request({ do: "events", from: 3, until: 31, skip: 1, limit: 1 });
   expect(events).toMatchObject({ is: "events", left_out: 5, known_until: 31 });

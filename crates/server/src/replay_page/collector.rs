@@ -6,18 +6,15 @@ use super::extent::finest_step_exponent;
 use super::parts::Parts;
 use crate::encode::{FrameColumns, FrameEncoder, scan, scene};
 use crate::event_store::EventStore;
+use crate::metric_history::MetricHistory;
 use crate::protocol::{
     BodyTable, FrameText, ReplayChunk, ReplayEvents, ReplayInspection, ReplayRun, ReplaySpan,
     ReplyBody, RunEvent, SessionState, SessionStatus, Speed,
 };
-use crate::samples::MetricSamples;
 use sidestep_kernel::view::{Body, Frame, FrameOptions, ScanSelection, Scenery};
 use sidestep_kernel::{Cycle, InputError, Simulation};
 use sidestep_session::{Error, FrameSink};
-use std::time::Duration;
 
-/// About as many samples of each metric are taken: a chart is at most about 2000 pixels wide.
-const SAMPLES: Cycle = 1000;
 /// Number of events in a part: a browser reads one within a picture.
 const EVENTS_PER_PART: u32 = 5000;
 /// Maximum number of inspections: some gigabytes of text before it is compressed.
@@ -25,11 +22,10 @@ const MAX_INSPECTIONS: usize = 100_000;
 /// Size of the text of inspections from which a part is complete: a browser reads one within a picture.
 const INSPECTIONS_PART_BYTES: usize = 1 << 20;
 
-/// The frames, events, samples and inspections of a run, so far.
+/// The frames, events, metrics and inspections of a run, so far.
 pub(super) struct ReplayCollector<'a> {
     parts: &'a mut Parts,
     options: &'a ReplayOptions<'a>,
-    sample_every: Cycle,
     scenery: Scenery,
     encoder: FrameEncoder,
     /// Made with the first frame, which tells how large the scene is.
@@ -39,7 +35,7 @@ pub(super) struct ReplayCollector<'a> {
     cycles: Vec<[Cycle; 3]>,
     tables: Vec<BodyTable>,
     log: EventStore,
-    samples: MetricSamples,
+    metrics: MetricHistory,
     inspections: InspectionParts,
     /// Digests of the states of all frames, if they are kept.
     digests: Vec<u8>,
@@ -64,10 +60,10 @@ pub(super) struct ReplayOrigin {
 }
 
 impl<'a> ReplayCollector<'a> {
-    /// Returns a collector for a run at the first of some cycles, which takes samples of its metrics.
+    /// Returns a collector for a run at the first of its cycles, with its metrics there.
     pub(super) fn new(
         run: &mut dyn Simulation,
-        (cycles, samples): (Cycle, MetricSamples),
+        metrics: MetricHistory,
         options: &'a ReplayOptions<'a>,
         parts: &'a mut Parts,
     ) -> Self {
@@ -76,7 +72,6 @@ impl<'a> ReplayCollector<'a> {
         Self {
             parts,
             options,
-            sample_every: cycles.div_ceil(SAMPLES).max(1).next_multiple_of(options.every),
             encoder: FrameEncoder::new(0, &scenery),
             scenery,
             chunk: None,
@@ -84,7 +79,7 @@ impl<'a> ReplayCollector<'a> {
             cycles: Vec::new(),
             tables: Vec::new(),
             log: EventStore::default(),
-            samples,
+            metrics,
             inspections: InspectionParts::default(),
             digests: Vec::new(),
         }
@@ -103,9 +98,7 @@ impl<'a> ReplayCollector<'a> {
     ) -> Result<ReplayRun, Error> {
         let last = self.chunk.as_mut().and_then(ChunkBuilder::take);
         self.push_chunk(last)?;
-        if self.samples.is_new_cycle(run.cycle()) {
-            self.samples.push(run.cycle(), &run.metrics(), Duration::ZERO);
-        }
+        self.metrics.add(&run.take_series());
         let status = self.first_status(run, origin.banner);
         let scene = scene(run.world_name(), run.agent_noun(), &self.scenery, true);
         let place = "scenario.toml".to_string();
@@ -125,7 +118,7 @@ impl<'a> ReplayCollector<'a> {
             cycles: self.cycles.iter().map(|run| run.map(|n| n as f64)).collect(),
             tables: self.parts.push_json(&self.tables)?,
             source: self.parts.push_json(&source)?,
-            metrics: self.parts.push_json(&self.samples.samples_reply(0))?,
+            metrics: self.parts.push_json(&self.metrics.metrics_reply(run, 0))?,
             chunks: std::mem::take(&mut self.chunks),
             events,
             events_left_out,
@@ -237,9 +230,7 @@ impl FrameSink for ReplayCollector<'_> {
         if self.options.has_digests {
             self.digests.extend(run.digest().as_bytes());
         }
-        if cycle.is_multiple_of(self.sample_every) || self.samples.is_empty() {
-            self.samples.push(cycle, &run.metrics(), Duration::ZERO);
-        }
+        self.metrics.add(&run.take_series());
         self.push_inspections(run, &frame)
     }
 }

@@ -2,7 +2,7 @@
 //! for.
 //!
 //! ```text
-//! collector.rs  frames, events, samples, inspections     chunk.rs, plane.rs  frames as few bytes
+//! collector.rs  frames, events, metrics, inspections     chunk.rs, plane.rs  frames as few bytes
 //! agents.rs     which agents are inspected               extent.rs           how exact places have to be
 //! parts.rs      deflated and as base64                   html.rs, start.js   the document
 //! ```
@@ -20,9 +20,9 @@ mod tests;
 
 pub use agents::{AgentNumber, CycleWindow, InspectionRequest};
 
+use crate::metric_history::{MetricHistory, MetricWords};
 use crate::page;
 use crate::protocol::{ReplayFile, ReplayRun, VERSION};
-use crate::samples::MetricSamples;
 use collector::{ReplayCollector, ReplayOptions, ReplayOrigin};
 use parts::Parts;
 use sidestep_kernel::text::group_thousands;
@@ -158,9 +158,11 @@ fn collect_run(
     let first = run.frame(FrameOptions::WITHOUT_SCANS);
     options.inspections.check(&first, (from, until))?;
     let world_type = worlds.find(run.world_name());
-    let infos = world_type.map_or(&[][..], |world_type| world_type.metric_infos());
-    let samples = MetricSamples::new(infos);
-    let mut collector = ReplayCollector::new(run.as_mut(), (until - from, samples), options, parts);
+    let words = world_type.map(MetricWords::from_world).unwrap_or_default();
+    // A recording that can only be shown has no metrics but those recorded.
+    let recorded_series = if recorded.is_flight { recorded.series()? } else { None };
+    let metrics = MetricHistory::from_run(run.as_mut(), until, recorded_series, words);
+    let mut collector = ReplayCollector::new(run.as_mut(), metrics, options, parts);
     let is_confirmed = source.drive(run.as_mut(), &mut collector)?;
     let last = run.cycle();
     let is_end = last == recorded.cycles_done;

@@ -137,7 +137,7 @@ fn frames_are_those_that_a_server_sends() {
 }
 
 #[test]
-fn events_samples_and_the_scenario_are_complete_and_name_no_folder() {
+fn events_metrics_and_the_scenario_are_complete_and_name_no_folder() {
     let replay =
         replay(ROBOTS, |request| request.inspections.agents = vec!["2".parse().expect("a number")]);
     let run = replay.run();
