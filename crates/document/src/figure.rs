@@ -21,6 +21,8 @@ pub struct Figure {
     pub kind: FigureKind,
     /// The series, in the order of the legend.
     pub series: Vec<Series>,
+    /// Whether a page shows only the title until a reader opens it.
+    pub is_folded: bool,
 }
 
 /// The scale of an axis.
@@ -52,6 +54,53 @@ pub enum FigureKind {
         /// Names of the categories, from 0.
         categories: Vec<String>,
     },
+    /// Markers side by side, on an axis that need not start at zero; `x` is the number of a category.
+    Dots {
+        /// Names of the categories, from 0.
+        categories: Vec<String>,
+    },
+    /// Steps up: the share of runs up to each value.
+    Steps,
+    /// Effects with their intervals against zero, one below the other: `x` is the number of a row, `y` the effect.
+    Forest {
+        /// Names of the rows, from the top.
+        rows: Vec<String>,
+        /// The effects in words, series by series and row by row.
+        texts: Vec<Vec<String>>,
+    },
+    /// Single runs in named slots: a series is a slot, `x` the number of a seed, `y` the value of its run.
+    Runs {
+        /// The statistics of each slot.
+        slots: Vec<SlotStats>,
+        /// Whether lines join the runs of one seed.
+        is_joined: bool,
+        /// Whether there is a line at zero, as differences need it.
+        has_zero_line: bool,
+    },
+    /// Colors over two factors: a series is a row, `x` the number of a column, `y` the value.
+    Heat {
+        /// Levels of the factor across, from 0.
+        columns: Vec<String>,
+        /// The quantity that the colors show, with its unit.
+        value_label: String,
+    },
+    /// Points, and the front of those that no other is better than in both quantities.
+    Front {
+        /// The corners of the front.
+        corners: Vec<(f64, f64)>,
+    },
+}
+
+/// What is drawn beside the runs of a slot.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct SlotStats {
+    /// The mean of the runs.
+    pub mean: Option<f64>,
+    /// Lower and upper end of its interval.
+    pub interval: Option<(f64, f64)>,
+    /// The least value within 1.5 interquartile ranges of the box, the quartiles with the median between them, and the
+    /// greatest such value: a box as Tukey drew it.
+    pub five_numbers: Option<[f64; 5]>,
 }
 
 /// A measured value at a place of the horizontal axis.
@@ -64,6 +113,9 @@ pub struct Point {
     /// Lower and upper end of the value's interval, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval: Option<(f64, f64)>,
+    /// Left and right end of the interval of the position, if that is measured, too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x_interval: Option<(f64, f64)>,
     /// Number of runs behind the value, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub n: Option<usize>,
@@ -73,6 +125,32 @@ impl Figure {
     /// Returns whether any point has an interval.
     pub fn has_intervals(&self) -> bool {
         self.series.iter().flat_map(|s| &s.points).any(|p| p.interval.is_some())
+    }
+
+    /// Returns the same figure, of which a page shows the title alone until it is opened.
+    #[must_use]
+    pub fn folded(self) -> Self {
+        Self { is_folded: true, ..self }
+    }
+
+    /// Returns the names of positions along the horizontal axis, where these are numbers of names.
+    pub fn position_names(&self) -> Option<&[String]> {
+        match &self.kind {
+            FigureKind::Bars { categories } | FigureKind::Dots { categories } => Some(categories),
+            FigureKind::Forest { rows, .. } => Some(rows),
+            FigureKind::Heat { columns, .. } => Some(columns),
+            _ => None,
+        }
+    }
+
+    /// Returns the names of the positions and of the values of its points, as heads of columns.
+    pub fn column_labels(&self) -> [&str; 2] {
+        match &self.kind {
+            FigureKind::Forest { .. } => ["row", &self.x_label],
+            FigureKind::Runs { .. } => ["replicate", &self.y_label],
+            FigureKind::Heat { value_label, .. } => [&self.x_label, value_label],
+            _ => [&self.x_label, &self.y_label],
+        }
     }
 
     /// Adds a note on its intervals: those that an [`Estimate`](super::Estimate) gives.
@@ -88,7 +166,7 @@ impl Figure {
 impl Point {
     /// Returns a value without an interval.
     pub fn new(x: f64, y: f64) -> Self {
-        Self { x, y, interval: None, n: None }
+        Self { x, y, interval: None, x_interval: None, n: None }
     }
 
     /// Adds an interval to the value.

@@ -171,6 +171,12 @@ pub(crate) struct FittedAxis {
 }
 
 impl FittedAxis {
+    /// Returns an axis of named rows of height 1, the first one highest.
+    pub(crate) fn rows(names: &[String]) -> Self {
+        let high = names.len().max(1) as f64;
+        Self { log: false, low: 0.0, high, ticks: Ticks::rows(names) }
+    }
+
     /// Lays the range's low end at pixel `from` and its high end at pixel `to`.
     pub(crate) fn scale_between(&self, from: f64, to: f64) -> Scale {
         let low = self.transform(self.low);

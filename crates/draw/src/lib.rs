@@ -42,13 +42,19 @@ mod svg;
 #[cfg(test)]
 mod testing;
 mod text;
+mod theme;
 mod ticks;
 
 pub use animation::{AnimationFrame, AnimationRenderer};
 pub use axis::Axis;
 pub use chart::bars::{Bar, BarChart, BarSeries};
+pub use chart::forest::{ForestChart, ForestMark, ForestSeries};
+pub use chart::heat::HeatChart;
 pub use chart::plot::{Mark, Plot, Point, Series};
+pub use chart::slots::{QuartileBox, Slot, SlotChart};
+pub use chart::{DrawnChart, Spot};
 pub use error::DrawError;
 pub use picture::{PictureOptions, bodies_with_trails, describe, draw};
 pub use raster::to_png;
 pub use style::{Style, series_colors};
+pub use theme::{DARK_COLORS, to_dark};

@@ -20,6 +20,14 @@ pub(crate) const FAINT_INK: &str = "#555555";
 /// Grid lines behind the data.
 pub(crate) const GRID: &str = "#E4E4E4";
 
+/// The ground of a picture.
+pub(crate) const GROUND: &str = "#FFFFFF";
+
+/// Returns the attributes of a thin line behind the data.
+pub(crate) fn reference_line(color: &str, width_px: f64) -> String {
+    format!(r#"fill="none" stroke="{color}" stroke-width="{width_px}" stroke-opacity="0.55""#)
+}
+
 /// Returns the color of the series (or track) with this number; colors repeat after seven.
 pub(crate) fn series_color(index: usize) -> String {
     const BLACK: Color = [0; 3];

@@ -54,6 +54,15 @@ impl Ticks {
     pub(crate) fn max_label_px(&self, width_px: impl Fn(&str) -> f64) -> f64 {
         self.major.iter().map(|(_, label)| width_px(label)).fold(0.0, f64::max)
     }
+
+    /// Returns marks at the middles of rows, each with the name of its row; the first row is the highest.
+    pub(crate) fn rows(names: &[String]) -> Self {
+        let count = names.len() as f64;
+        let middle = |k: usize| count - 0.5 - k as f64;
+        // In rising order, as those of other axes.
+        let major = names.iter().enumerate().rev().map(|(k, name)| (middle(k), name.clone()));
+        Self { major: major.collect(), minor: vec![] }
+    }
 }
 
 /// Spacing of labels: a label that would touch the one before it is not written.

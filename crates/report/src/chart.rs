@@ -1,32 +1,115 @@
 //! Figures as SVG.
 
-use sidestep_document::figure::{Point, Scale};
-use sidestep_document::{Figure, FigureKind};
-use sidestep_draw::{Axis, Bar, BarChart, BarSeries, DrawError, Mark, Plot, Style};
+use sidestep_document::figure::{Point, Scale, SlotStats};
+use sidestep_document::{Figure, FigureKind, Series};
+use sidestep_draw::{
+    Axis, Bar, BarChart, BarSeries, DrawError, DrawnChart, ForestChart, ForestMark, ForestSeries,
+    HeatChart, Mark, Plot, QuartileBox, Slot, SlotChart, Style,
+};
 
+/// Style of figures in a report: two of them stand beside each other, and one on a telephone is still readable.
+const PAGE: Style = Style { width_px: 520.0, height_px: 370.0, font_px: 13.0 };
 /// Style of trajectories in the plane: the drawing without axes and labels is about square, as its two ranges are equal.
-const SQUARE: Style = Style { height_px: 620.0, ..Style::CHART };
+const SQUARE: Style = Style { height_px: 500.0, ..PAGE };
+/// Style of forests, whose rows have names and words beside them.
+const WIDE: Style = Style { width_px: 860.0, ..PAGE };
 
-/// Draws a figure of an experiment.
+/// Draws a figure of an experiment for a page, which shows its title and its note itself.
 ///
 /// # Errors
 /// When it cannot be drawn.
-pub fn chart_svg(figure: &Figure) -> Result<String, DrawError> {
-    let style = if figure.kind == FigureKind::Ways { &SQUARE } else { &Style::CHART };
-    chart_svg_with_style(figure, style)
+pub(crate) fn page_chart(figure: &Figure) -> Result<DrawnChart, DrawError> {
+    let style = match figure.kind {
+        FigureKind::Ways => &SQUARE,
+        FigureKind::Forest { .. } => &WIDE,
+        _ => &PAGE,
+    };
+    let bare = Figure { title: String::new(), note: String::new(), ..figure.clone() };
+    draw_chart(&bare, style)
 }
 
 /// Draws a figure in a style.
 ///
 /// # Errors
 /// When it cannot be drawn.
-pub(crate) fn chart_svg_with_style(figure: &Figure, style: &Style) -> Result<String, DrawError> {
+pub(crate) fn draw_chart(figure: &Figure, style: &Style) -> Result<DrawnChart, DrawError> {
     match &figure.kind {
-        FigureKind::Bars { categories } => bars(figure, categories).to_svg(style),
-        FigureKind::Ways => trajectory_plot(figure).to_svg(style),
-        FigureKind::Lines => plot(figure, Mark::Line).to_svg(style),
-        FigureKind::Bands => plot(figure, Mark::Band).to_svg(style),
-        FigureKind::Points => plot(figure, Mark::Points).to_svg(style),
+        FigureKind::Bars { categories } => bars(figure, categories).draw(style),
+        FigureKind::Dots { categories } => bars(figure, categories).dots().draw(style),
+        FigureKind::Ways => trajectory_plot(figure).draw(style),
+        FigureKind::Lines => plot(figure, Mark::Line).draw(style),
+        FigureKind::Bands => plot(figure, Mark::Band).draw(style),
+        FigureKind::Points => plot(figure, Mark::Points).draw(style),
+        FigureKind::Steps => plot(figure, Mark::Steps).draw(style),
+        FigureKind::Front { corners } => {
+            plot(figure, Mark::Points).reference_path("front", corners.clone()).draw(style)
+        }
+        FigureKind::Forest { rows, texts } => forest(figure, rows, texts).draw(style),
+        FigureKind::Runs { slots, is_joined, has_zero_line } => {
+            let mut chart = SlotChart::new(
+                &figure.title,
+                axis(figure.y_scale, &figure.y_label),
+                chart_slots(figure, slots),
+            );
+            if *is_joined {
+                chart = chart.joined();
+            }
+            if *has_zero_line {
+                chart = chart.zero_line();
+            }
+            chart.x_label(&figure.x_label).note(&figure.note).draw(style)
+        }
+        FigureKind::Heat { columns, value_label } => {
+            heat(figure, columns, value_label).draw(style)
+        }
+    }
+}
+
+fn forest(figure: &Figure, rows: &[String], texts: &[Vec<String>]) -> ForestChart {
+    let mut chart = ForestChart::new(&figure.title, axis(figure.x_scale, &figure.x_label), rows)
+        .note(&figure.note);
+    for (series, texts) in figure.series.iter().zip(texts) {
+        let mark = |(row, text): (usize, &String)| {
+            let point = series.points.iter().find(|p| p.x == row as f64);
+            ForestMark {
+                value: point.map_or(f64::NAN, |p| p.y),
+                interval: point.and_then(|p| p.interval),
+                text: text.clone(),
+            }
+        };
+        let marks = texts.iter().enumerate().map(mark).collect();
+        chart = chart.series(ForestSeries { label: series.name.clone(), marks });
+    }
+    chart
+}
+
+fn chart_slots(figure: &Figure, stats: &[SlotStats]) -> Vec<Slot> {
+    let slot = |(series, stats): (&Series, &SlotStats)| Slot {
+        label: series.name.clone(),
+        values: series.points.iter().map(|p| p.y).collect(),
+        mean: stats.mean.map(|mean| (mean, stats.interval)),
+        quartiles: stats.five_numbers.map(|[low, first, median, third, high]| QuartileBox {
+            whiskers: [low, high],
+            quartiles: [first, median, third],
+        }),
+    };
+    figure.series.iter().zip(stats).map(slot).collect()
+}
+
+fn heat(figure: &Figure, columns: &[String], value_label: &str) -> HeatChart {
+    let row = |series: &Series| {
+        let cell = |k| series.points.iter().find(|p| p.x == k as f64).map_or(f64::NAN, |p| p.y);
+        (0..columns.len()).map(cell).collect()
+    };
+    HeatChart {
+        title: figure.title.clone(),
+        note: figure.note.clone(),
+        x_label: figure.x_label.clone(),
+        y_label: figure.y_label.clone(),
+        value_label: value_label.into(),
+        columns: columns.to_vec(),
+        rows: figure.series.iter().map(|series| series.name.clone()).collect(),
+        values: figure.series.iter().map(row).collect(),
     }
 }
 
@@ -53,7 +136,7 @@ fn plot(figure: &Figure, mark: Mark) -> Plot {
 }
 
 fn point(p: &Point) -> sidestep_draw::Point {
-    sidestep_draw::Point { x: p.x, y: p.y, interval: p.interval }
+    sidestep_draw::Point { x: p.x, y: p.y, interval: p.interval, x_interval: p.x_interval }
 }
 
 /// Half of the range of an axis of trajectories, as a fraction of the larger extent: a margin of 4 % on each side, so that no

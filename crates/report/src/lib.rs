@@ -5,15 +5,14 @@ mod html;
 pub mod markdown;
 mod print;
 
-pub use chart::chart_svg;
 pub use print::PrintStyle;
 
 use sidestep_document::Document;
 use sidestep_document::document::Block;
-use sidestep_draw::DrawError;
+use sidestep_draw::{DrawError, DrawnChart, Spot};
 
 /// A report, ready to be stored.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RenderedReport {
     /// The page; self-contained.
     pub html: String,
@@ -24,12 +23,14 @@ pub struct RenderedReport {
 }
 
 /// A picture and its file name.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SvgFile {
     /// Name without its ending, e.g. `03-speed-up`.
     pub stem: String,
     /// The picture as a whole SVG document, which needs no other file.
     pub svg: String,
+    /// Where the marks of a figure are; a picture has none.
+    pub spots: Vec<Spot>,
 }
 
 /// Renders a document as page, text and pictures. `folder` is the folder of the pictures, as seen
@@ -50,14 +51,16 @@ pub fn render(document: &Document, folder: &str) -> Result<RenderedReport, DrawE
 fn pictures(document: &Document) -> Result<Vec<SvgFile>, DrawError> {
     let mut files = Vec::new();
     for block in &document.blocks {
-        let (title, svg) = match block {
-            Block::Figure(figure) => (&figure.title, chart_svg(figure)?),
-            Block::Picture(picture) => (&picture.title, picture.svg.clone()),
+        let (title, DrawnChart { svg, spots }) = match block {
+            Block::Figure(figure) => (&figure.title, chart::page_chart(figure)?),
+            Block::Picture(picture) => {
+                (&picture.title, DrawnChart { svg: picture.svg.clone(), spots: Vec::new() })
+            }
             _ => continue,
         };
         // The number keeps the files of a folder in the order of the document, and tells equal titles apart.
         let stem = format!("{:02}-{}", files.len() + 1, slug(title));
-        files.push(SvgFile { stem, svg });
+        files.push(SvgFile { stem, svg, spots });
     }
     Ok(files)
 }

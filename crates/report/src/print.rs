@@ -31,9 +31,9 @@ impl PrintStyle {
         let style = self.style();
         let mut files = Vec::new();
         for figure in figures(document) {
-            let svg = chart::chart_svg_with_style(&self.for_print(figure), &style)?;
+            let chart = chart::draw_chart(&self.for_print(figure), &style)?;
             let stem = format!("{:02}-{}", files.len() + 1, slug(&figure.title));
-            files.push(SvgFile { stem, svg });
+            files.push(SvgFile { stem, svg: chart.svg, spots: chart.spots });
         }
         Ok(files)
     }

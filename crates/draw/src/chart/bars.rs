@@ -1,10 +1,10 @@
 //! Grouped bars: one group per category, in each group one bar per series.
 
 use crate::axis::Axis;
-use crate::chart::error_bar;
+use crate::chart::{DrawnChart, error_bar};
 use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks};
 use crate::error::DrawError;
-use crate::legend::{LegendEntry, LegendSymbol};
+use crate::legend::{LegendEntry, LegendSymbol, Marker};
 use crate::style::{INK, Style, series_color, series_fill};
 use crate::svg::Rect;
 
@@ -12,6 +12,10 @@ use crate::svg::Rect;
 const FILLED_FRACTION: f64 = 0.78;
 /// Greatest width of a bar: a few wide ones would look like areas.
 const MAX_BAR_WIDTH_PX: f64 = 60.0;
+
+/// Radius of a marker in place of a bar, and half the width of the caps of its interval.
+const DOT_PX: f64 = 4.5;
+const DOT_CAP_PX: f64 = 4.0;
 
 /// The height of a bar, optionally with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +70,7 @@ pub struct BarChart {
     categories: Vec<String>,
     y: Axis,
     series: Vec<BarSeries>,
+    are_dots: bool,
 }
 
 impl BarChart {
@@ -81,7 +86,15 @@ impl BarChart {
             categories: categories.into_iter().map(Into::into).collect(),
             y: Axis::linear(""),
             series: vec![],
+            are_dots: false,
         }
+    }
+
+    /// Draws markers in place of bars. They need no zero on the axis, so that small differences of large values are seen.
+    #[must_use]
+    pub fn dots(mut self) -> Self {
+        self.are_dots = true;
+        self
     }
 
     /// Names the categories as a whole.
@@ -118,6 +131,14 @@ impl BarChart {
     /// [`DrawError::Length`] if a series has not one bar per category, [`DrawError::Value`] if the
     /// style or the axis's given range is impossible.
     pub fn to_svg(&self, style: &Style) -> Result<String, DrawError> {
+        self.draw(style).map(|chart| chart.svg)
+    }
+
+    /// Draws the chart, and returns where its marks are.
+    ///
+    /// # Errors
+    /// As [`Self::to_svg`].
+    pub fn draw(&self, style: &Style) -> Result<DrawnChart, DrawError> {
         style.check()?;
         for series in &self.series {
             DrawError::length("bars of a series", self.categories.len(), series.bars.len())?;
@@ -129,31 +150,39 @@ impl BarChart {
             x_label: &self.x_label,
             y_label: self.y.label(),
             legend: self.legend(),
+            ..FrameText::default()
         };
         let mut frame = ChartFrame::open(style, words, &XAxis::Categories(&self.categories), &y);
         frame.open_data();
         for (index, series) in self.series.iter().enumerate() {
             self.draw_series(&mut frame, index, series);
         }
-        let base = frame.y.base_px();
-        let area = frame.area;
-        frame.svg.line((area.x, base), (area.right(), base), format_args!(r#"stroke="{INK}""#));
+        if !self.are_dots {
+            let base = frame.y.base_px();
+            let area = frame.area;
+            frame.svg.line((area.x, base), (area.right(), base), format_args!(r#"stroke="{INK}""#));
+        }
         frame.svg.close_group();
         Ok(frame.finish())
     }
 
-    /// Returns all values that the axis must show, including zero, where bars start.
+    /// Returns all values that the axis must show: zero is among them where bars start there.
     fn heights(&self) -> impl Iterator<Item = f64> {
         let bars = self.series.iter().flat_map(|series| &series.bars);
-        bars.flat_map(Bar::heights).chain([0.0])
+        let base = (!self.are_dots).then_some(0.0);
+        bars.flat_map(Bar::heights).chain(base)
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
         let mut entries = Vec::with_capacity(self.series.len());
         for (index, series) in self.series.iter().enumerate() {
             let (opacity, rim) = series_fill(index);
-            let fill = series_color(index).into();
-            let symbol = LegendSymbol::Swatch { fill, rim: rim.into(), opacity };
+            let color = series_color(index).into();
+            let symbol = if self.are_dots {
+                LegendSymbol::Marker { color, marker: Marker::of_series(index) }
+            } else {
+                LegendSymbol::Swatch { fill: color, rim: rim.into(), opacity }
+            };
             entries.push(LegendEntry::new(symbol, &series.label));
         }
         entries
@@ -168,7 +197,13 @@ impl BarChart {
         for (category, bar) in series.bars.iter().enumerate() {
             if self.y.contains(bar.value) {
                 let center = frame.area.x + (category as f64 + 0.5) * slot + aside;
-                draw_bar(frame, bar, center, width, index);
+                if self.are_dots {
+                    draw_dot(frame, bar, center, index);
+                } else {
+                    draw_bar(frame, bar, center, width, index);
+                }
+                let end = frame.y.px(bar.value);
+                frame.push_spot((center, end), index, category);
             }
         }
     }
@@ -182,6 +217,17 @@ fn draw_bar(frame: &mut ChartFrame, bar: &Bar, center: f64, width: f64, index: u
         let ends = (frame.y.px(low), frame.y.px(high));
         error_bar(&mut frame.svg, center, ends, (0.2 * width).min(5.0), INK);
     }
+}
+
+/// Draws the marker of a series at the height of `bar`.
+fn draw_dot(frame: &mut ChartFrame, bar: &Bar, center: f64, index: usize) {
+    let color = series_color(index);
+    if let Some((low, high)) = bar.interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
+        let ends = (frame.y.px(low), frame.y.px(high));
+        error_bar(&mut frame.svg, center, ends, DOT_CAP_PX, &color);
+    }
+    let at = (center, frame.y.px(bar.value));
+    Marker::of_series(index).draw(&mut frame.svg, at, DOT_PX, &color);
 }
 
 /// Draws a filled column from the axis's base to `value`, its left edge at `x`.

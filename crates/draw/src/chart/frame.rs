@@ -1,6 +1,7 @@
 //! The frame of a chart: margins that fit the labels, grid, ticks, axis labels, title, legend.
 
 use crate::axis::{FittedAxis, Scale};
+use crate::chart::{DrawnChart, Spot};
 use crate::legend::{Legend, LegendEntry, paragraph, title_style};
 use crate::style::{FAINT_INK, GRID, INK, Style};
 use crate::svg::{Anchor, Rect, Svg, SvgNumber, TextStyle};
@@ -19,6 +20,9 @@ const UPRIGHT_GAP_PX: f64 = 4.0;
 const MAX_UPRIGHT_FRACTION: f64 = 0.4;
 /// Least fraction of the picture's height for the data: long labels make the picture higher, not the data flat.
 const MIN_AREA_FRACTION: f64 = 0.55;
+/// Largest fraction of the picture's width that labels of the vertical axis take; longer ones are broken. Numbers never
+/// are so long, names of metrics are.
+const MAX_TICK_LABEL_FRACTION: f64 = 0.34;
 
 /// The content of the horizontal axis.
 pub(crate) enum XAxis<'a> {
@@ -28,13 +32,18 @@ pub(crate) enum XAxis<'a> {
     Categories(&'a [String]),
 }
 
-/// The words of a frame.
+/// The words of a frame, and the room that they take beside the data.
+#[derive(Default)]
 pub(crate) struct FrameText<'a> {
     pub(crate) title: &'a str,
     pub(crate) note: &'a str,
     pub(crate) x_label: &'a str,
     pub(crate) y_label: &'a str,
     pub(crate) legend: Vec<LegendEntry>,
+    /// Room on the right of the area, for text beside the data.
+    pub(crate) beside_px: f64,
+    /// Least height of the area, for data in rows.
+    pub(crate) rows_px: f64,
 }
 
 /// Returns the number of labeled ticks that fit a picture of this style, across and upward.
@@ -55,6 +64,7 @@ pub(crate) struct ChartFrame {
     title: String,
     note: Vec<String>,
     note_top: f64,
+    spots: Vec<Spot>,
 }
 
 /// The lines of text around the area, broken to fit.
@@ -63,6 +73,7 @@ struct WrappedLabels {
     note: Vec<String>,
     x: Vec<String>,
     y: Vec<String>,
+    y_ticks: Vec<Vec<String>>,
     slots: SlotNames,
 }
 
@@ -76,22 +87,40 @@ struct SlotNames {
 }
 
 impl WrappedLabels {
-    /// Breaks all text for an area `width` pixels wide; `y` is already broken.
-    fn wrap(
-        style: &Style,
-        words: &FrameText<'_>,
-        across: &XAxis<'_>,
-        y: Vec<String>,
-        width: f64,
-    ) -> Self {
+    /// Breaks the text beside the area, which decides how wide that is.
+    fn beside(style: &Style, words: &FrameText<'_>, up: &FittedAxis) -> Self {
+        let least_height = MIN_AREA_FRACTION * style.height_px;
+        let room = MAX_TICK_LABEL_FRACTION * style.width_px;
+        let wrap_tick =
+            |label: &String| text::wrap(label, style.small_px(), Weight::Regular, room);
+        Self {
+            title: vec![],
+            note: vec![],
+            x: vec![],
+            y: text::wrap(words.y_label, style.font_px, Weight::Regular, least_height),
+            y_ticks: up.ticks.major.iter().map(|(_, label)| wrap_tick(label)).collect(),
+            slots: SlotNames::default(),
+        }
+    }
+
+    /// Breaks the text above and below an area `width` pixels wide.
+    fn wrap(self, style: &Style, words: &FrameText<'_>, across: &XAxis<'_>, width: f64) -> Self {
         let whole = style.width_px - 2.0 * EDGE_PX;
         Self {
             title: text::wrap(words.title, style.title_px(), Weight::Bold, whole),
             note: text::wrap(words.note, style.small_px(), Weight::Regular, whole),
             x: text::wrap(words.x_label, style.font_px, Weight::Regular, width),
-            y,
             slots: SlotNames::wrap(style, across, width),
+            ..self
         }
+    }
+
+    /// Returns the width of everything between the left edge and the area.
+    fn left_px(&self, style: &Style) -> f64 {
+        let lines = self.y_ticks.iter().flatten();
+        let widths = lines.map(|line| text::width(line, style.small_px(), Weight::Regular));
+        let ticks_px = widths.fold(0.0, f64::max) + TICK_PX + 8.0;
+        EDGE_PX + self.y.len() as f64 * line_px(style) + ticks_px
     }
 
     /// Returns the height of everything between the area and the note.
@@ -134,25 +163,24 @@ impl ChartFrame {
         across: &XAxis<'_>,
         up: &FittedAxis,
     ) -> Self {
-        let least_height = MIN_AREA_FRACTION * style.height_px;
-        let y = text::wrap(words.y_label, style.font_px, Weight::Regular, least_height);
-        let labels_px =
-            up.ticks.max_label_px(|label| text::width(label, style.small_px(), Weight::Regular));
-        let ticks_px = labels_px + TICK_PX + 8.0;
-        let left = EDGE_PX + y.len() as f64 * line_px(style) + ticks_px;
-        let width = (style.width_px - left - EDGE_PX - right_room(style, across)).max(60.0);
-        let labels = WrappedLabels::wrap(style, &words, across, y, width);
+        let beside = WrappedLabels::beside(style, &words, up);
+        let left = beside.left_px(style);
+        let right = EDGE_PX + right_room(style, across) + words.beside_px;
+        let width = (style.width_px - left - right).max(60.0);
+        let labels = beside.wrap(style, &words, across, width);
         let legend = Legend::new(words.legend, style.font_px, style.width_px - 2.0 * EDGE_PX);
         let mut svg = Svg::default();
         let top = draw_head(&mut svg, style, &labels.title, &legend);
         let below = labels.below_px(style);
         let note_px = labels.note.len() as f64 * style.small_px() * 1.35;
+        let least_height = (MIN_AREA_FRACTION * style.height_px).max(words.rows_px);
         let height = (style.height_px - top - below - note_px - EDGE_PX).max(least_height);
         let area = Rect { x: left, y: top, width, height };
         let title = words.title.to_string();
         let y = up.scale_between(area.bottom(), area.y);
         let note_top = area.bottom() + below;
-        let mut frame = Self { svg, area, y, style: *style, title, note: vec![], note_top };
+        let mut frame =
+            Self { svg, area, y, style: *style, title, note: vec![], note_top, spots: vec![] };
         frame.draw_axes(across, up, &labels);
         frame.note = labels.note;
         frame
@@ -167,15 +195,22 @@ impl ChartFrame {
         self.svg.open_clip(self.area.grown(6.0));
     }
 
-    pub(crate) fn finish(mut self) -> String {
+    /// Notes where the mark of a value is.
+    pub(crate) fn push_spot(&mut self, (x, y): (f64, f64), series: usize, point: usize) {
+        self.spots.push(Spot { x_px: x, y_px: y, series, point });
+    }
+
+    pub(crate) fn finish(mut self) -> DrawnChart {
         let text_style =
             TextStyle { fill: FAINT_INK, ..TextStyle::new(self.style.small_px(), Anchor::Start) };
         let end = paragraph(&mut self.svg, &self.note, (EDGE_PX, self.note_top), &text_style);
-        self.svg.finish(self.style.width_px, (end + EDGE_PX).max(self.style.height_px), &self.title)
+        let height = (end + EDGE_PX).max(self.style.height_px);
+        let svg = self.svg.finish(self.style.width_px, height, &self.title);
+        DrawnChart { svg, spots: self.spots }
     }
 
     fn draw_axes(&mut self, across: &XAxis<'_>, up: &FittedAxis, labels: &WrappedLabels) {
-        self.draw_y_ticks(up);
+        self.draw_y_ticks(up, &labels.y_ticks);
         match across {
             XAxis::Values(fitted) => self.draw_x_ticks(fitted),
             XAxis::Categories(_) => self.draw_categories(&labels.slots),
@@ -187,16 +222,22 @@ impl ChartFrame {
         self.draw_axis_labels(labels);
     }
 
-    fn draw_y_ticks(&mut self, up: &FittedAxis) {
+    fn draw_y_ticks(&mut self, up: &FittedAxis, labels: &[Vec<String>]) {
         let (left, right) = (self.area.x, self.area.right());
         let text_style = TextStyle::new(self.style.small_px(), Anchor::End);
         let mut spacing = LabelSpacing::new();
-        for (value, label) in &up.ticks.major {
+        for ((value, _), lines) in up.ticks.major.iter().zip(labels) {
             let y = self.y.px(*value);
             self.svg.line((left, y), (right, y), grid_ink());
             self.svg.line((left - TICK_PX, y), (left, y), axis_ink());
-            if spacing.try_place(-y, text_style.size_px) {
-                self.svg.text(left - TICK_PX - 3.0, y + text_style.middle_px(), label, &text_style);
+            let line_px = 1.15 * text_style.size_px;
+            let more_lines_px = lines.len().saturating_sub(1) as f64 * line_px;
+            if spacing.try_place(-y, text_style.size_px + more_lines_px) {
+                let first = y + text_style.middle_px() - more_lines_px / 2.0;
+                for (row, line) in lines.iter().enumerate() {
+                    let baseline = first + row as f64 * line_px;
+                    self.svg.text(left - TICK_PX - 3.0, baseline, line, &text_style);
+                }
             }
         }
         for value in &up.ticks.minor {

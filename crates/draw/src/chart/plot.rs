@@ -1,14 +1,14 @@
 //! Lines and points over numeric axes.
 
 use crate::axis::{Axis, FittedAxis, Scale};
-use crate::chart::error_bar;
+use crate::chart::{DrawnChart, error_bar, level_error_bar};
 use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks, polyline};
 use crate::error::DrawError;
 use crate::legend::{
     LegendEntry, LegendSymbol, Marker, arrowhead, reference_line_attributes, start_mark,
 };
 use crate::style::{FAINT_INK, Style, series_color, series_dash};
-use crate::svg::Svg;
+use crate::svg::{Rect, Svg};
 use sidestep_kernel::math::hypot;
 
 /// Distance below which two points of a line cannot be distinguished, pixels.
@@ -27,12 +27,14 @@ pub struct Point {
     pub y: f64,
     /// Lower and upper end of the error bar, in units of the vertical axis.
     pub interval: Option<(f64, f64)>,
+    /// Left and right end of the error bar along the horizontal axis.
+    pub x_interval: Option<(f64, f64)>,
 }
 
 impl Point {
     /// Returns a value without an error bar.
     pub fn new(x: f64, y: f64) -> Self {
-        Self { x, y, interval: None }
+        Self { x, y, interval: None, x_interval: None }
     }
 
     /// Adds an error bar from `low` to `high`, e.g. a 95 % confidence interval.
@@ -54,6 +56,9 @@ pub enum Mark {
     Path,
     /// Markers only.
     Points,
+    /// Steps: level up to the next point, as a share of runs is; the first one rises from the low end of the axis, and the
+    /// last level goes on to its right end.
+    Steps,
 }
 
 /// Points that belong together; color and marker follow from the series' number.
@@ -87,7 +92,7 @@ impl Series {
         match self.mark {
             Mark::Points => true,
             Mark::Line => self.points.len() <= MAX_MARKERS,
-            Mark::Band | Mark::Path => false,
+            Mark::Band | Mark::Path | Mark::Steps => false,
         }
     }
 }
@@ -112,6 +117,14 @@ pub struct Plot {
     y: Axis,
     series: Vec<Series>,
     ideals: Vec<IdealLine>,
+    references: Vec<ReferencePath>,
+}
+
+/// Straight pieces through points in data coordinates, such as the front of what can be had of two quantities.
+#[derive(Debug, Clone, PartialEq)]
+struct ReferencePath {
+    label: String,
+    points: Vec<(f64, f64)>,
 }
 
 impl Plot {
@@ -124,6 +137,7 @@ impl Plot {
             y: Axis::linear("y"),
             series: vec![],
             ideals: vec![],
+            references: vec![],
         }
     }
 
@@ -156,6 +170,13 @@ impl Plot {
         self
     }
 
+    /// Adds a dashed line through `points` behind the data. It does not widen the axes.
+    #[must_use]
+    pub fn reference_path(mut self, label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        self.references.push(ReferencePath { label: label.into(), points });
+        self
+    }
+
     /// Sets the small print under the plot, e.g. the meaning of the error bars.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
@@ -168,9 +189,17 @@ impl Plot {
     /// # Errors
     /// [`DrawError::Value`] if the style or an axis's given range is impossible.
     pub fn to_svg(&self, style: &Style) -> Result<String, DrawError> {
+        self.draw(style).map(|chart| chart.svg)
+    }
+
+    /// Draws the plot, and returns where its marks are.
+    ///
+    /// # Errors
+    /// As [`Self::to_svg`].
+    pub fn draw(&self, style: &Style) -> Result<DrawnChart, DrawError> {
         style.check()?;
         let (most_across, most_up) = max_ticks(style);
-        let x = self.x.fit(self.drawable().map(|p| p.x), most_across)?;
+        let x = self.x.fit(self.drawable().flat_map(x_values), most_across)?;
         let y = self.y.fit(self.drawable().flat_map(y_values), most_up)?;
         let words = FrameText {
             title: &self.title,
@@ -178,6 +207,7 @@ impl Plot {
             x_label: self.x.label(),
             y_label: self.y.label(),
             legend: self.legend(),
+            ..FrameText::default()
         };
         let across = XAxis::Values(x.clone());
         let mut frame = ChartFrame::open(style, words, &across, &y);
@@ -185,6 +215,12 @@ impl Plot {
         let x_scale = frame.x_scale(&x);
         for ideal in &self.ideals {
             draw_ideal_line(&mut frame, ideal, &x, x_scale, &self.y);
+        }
+        for reference in &self.references {
+            let y = frame.y;
+            let places = reference.points.iter().map(|point| (x_scale.px(point.0), y.px(point.1)));
+            let data = polyline(places);
+            frame.svg.path(&data, reference_line_attributes(FAINT_INK));
         }
         for index in 0..self.series.len() {
             self.draw_series(&mut frame, x_scale, index, style);
@@ -208,18 +244,19 @@ impl Plot {
             let marker = Marker::of_series(index);
             let symbol = match series.mark {
                 Mark::Points => LegendSymbol::Marker { color, marker },
-                Mark::Line | Mark::Band | Mark::Path => {
+                Mark::Line | Mark::Band | Mark::Path | Mark::Steps => {
                     let marker = series.shows_markers().then_some(marker);
                     LegendSymbol::Line { color, marker, dash: series_dash(index) }
                 }
             };
             LegendEntry::new(symbol, &series.label)
         });
-        let ideals = self
-            .ideals
-            .iter()
-            .map(|line| LegendEntry::new(LegendSymbol::Dashes { color: FAINT_INK }, &line.label));
-        series.chain(ideals).collect()
+        let ideals = self.ideals.iter().map(|line| &line.label);
+        let references = self.references.iter().map(|line| &line.label);
+        let dashes = ideals
+            .chain(references)
+            .map(|label| LegendEntry::new(LegendSymbol::Dashes { color: FAINT_INK }, label));
+        series.chain(dashes).collect()
     }
 
     fn draw_series(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
@@ -232,8 +269,16 @@ impl Plot {
         if series.mark != Mark::Points {
             self.draw_line(frame, x, index, style);
         }
-        for point in series.points.iter().filter(|p| self.contains(p)) {
+        for (number, point) in series.points.iter().enumerate() {
+            if !self.contains(point) {
+                continue;
+            }
             let at = (x.px(point.x), y.px(point.y));
+            frame.push_spot(at, index, number);
+            if let Some((low, high)) = point.x_interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
+                let ends = (x.px(low), x.px(high));
+                level_error_bar(&mut frame.svg, at.1, ends, 0.3 * style.font_px, color);
+            }
             if let Some((low, high)) = bounds(point).filter(|_| series.mark != Mark::Band) {
                 error_bar(
                     &mut frame.svg,
@@ -255,9 +300,13 @@ impl Plot {
         let color = &series_color(index);
         let dash = series_dash(index);
         let y = frame.y;
-        for run in series.points.split(|p| !self.contains(p)).filter(|run| run.len() > 1) {
+        for run in series.points.split(|p| !self.contains(p)).filter(|run| has_line(series.mark, run)) {
             let places: Vec<Px> = run.iter().map(|p| (x.px(p.x), y.px(p.y))).collect();
-            let data = polyline(decimate(places.iter().copied()));
+            let data = if series.mark == Mark::Steps {
+                polyline(steps(&places, frame.area).into_iter())
+            } else {
+                polyline(decimate(places.iter().copied()))
+            };
             let attributes = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
             frame.svg.path(&data, format_args!(r#"stroke="{color}" {attributes}{dash}"#));
             if series.mark == Mark::Path {
@@ -277,6 +326,30 @@ impl Plot {
             frame.svg.path(&data, format_args!(r#"fill="{color}" fill-opacity="0.2""#));
         }
     }
+}
+
+/// Returns whether a run of points has a line: one point alone has none, but a step.
+fn has_line(mark: Mark, run: &[Point]) -> bool {
+    run.len() > 1 || (mark == Mark::Steps && !run.is_empty())
+}
+
+/// Returns the corners of steps through points, from the lower edge of an area to its right edge.
+fn steps(places: &[Px], area: Rect) -> Vec<Px> {
+    let mut corners = Vec::with_capacity(2 * places.len() + 1);
+    let mut level = area.bottom();
+    for (x, y) in places {
+        corners.push((*x, level));
+        corners.push((*x, *y));
+        level = *y;
+    }
+    corners.push((area.right(), level));
+    corners
+}
+
+/// Returns the horizontal values that a point covers.
+fn x_values(point: &Point) -> impl Iterator<Item = f64> {
+    let (low, high) = point.x_interval.unwrap_or((point.x, point.x));
+    [low, point.x, high].into_iter()
 }
 
 /// Returns a point's interval, if it can be drawn.

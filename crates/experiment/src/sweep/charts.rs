@@ -2,18 +2,22 @@
 //!
 //! A numeric parameter gives lines, one for each combination of the other parameters; if there are
 //! more than [`MAX_SERIES`] of these, numeric parameters among them are averaged over, then also
-//! parameters of words. A parameter of words gives bars. Averages are only taken in full grids. If
+//! parameters of words. A parameter of words gives the runs beside each other, or dots of means. Averages are only taken in full grids. If
 //! variants are samples of a box, as in a Latin hypercube, they are points: in the box itself, if it
 //! has two sides, and over each side. Without
-//! parameters the variants are bars, and a single variant is shown by its distribution over runs.
+//! parameters the variants stand beside each other, and a single variant is shown by its distribution over runs.
 
 use super::Label;
-use super::groups::RunGroups;
+use super::groups::{Level, Parameter, RunGroups};
 use super::label::capitalized;
+use super::run_charts::boxed_runs;
 use super::table::RunColumn;
-use sidestep_document::figure::Point;
+use super::text::with_interval;
+use sidestep_document::figure::{Point, Scale};
 use sidestep_document::{Figure, FigureKind, Series};
 use sidestep_kernel::ports::ColumnValues;
+use sidestep_kernel::math;
+use sidestep_statistics::least_squares::Fit;
 use sidestep_statistics::{Sample, wilson};
 use std::collections::BTreeMap;
 
@@ -29,6 +33,12 @@ const MAX_STEPS: usize = 200;
 pub(super) fn figures(groups: &RunGroups<'_>, metric: &RunColumn) -> Vec<Figure> {
     if is_sampled(groups) {
         return sample_figures(groups, metric);
+    }
+    if let [only] = &groups.parameters[..]
+        && !only.numeric
+        && let Some(figure) = run_figure(groups, metric)
+    {
+        return vec![figure];
     }
     let parameters = 0..groups.parameters.len();
     if !parameters.is_empty() {
@@ -120,7 +130,7 @@ fn parameter_figure(
     let kind = if axis.numeric {
         FigureKind::Lines
     } else {
-        FigureKind::Bars { categories: axis.levels.iter().map(|l| l.name()).collect() }
+        FigureKind::Dots { categories: axis.levels.iter().map(|l| l.name()).collect() }
     };
     let over = Label::from_name(&axis.name);
     let title = format!("{} over {}", capitalized(&groups.label(metric)), over.text);
@@ -129,8 +139,70 @@ fn parameter_figure(
     if is_averaged {
         note += " Means over the other parameters, too.";
     }
+    let scales = AxisScales::choose(axis, &series);
+    if let Some(slope) = scales.slope(&series) {
+        note = format!("{note} {slope}");
+    }
     let figure = figure(groups, metric, title, over.to_string());
-    Some(Figure { note, kind, series, ..figure })
+    Some(Figure { note, kind, series, x_scale: scales.x, y_scale: scales.y, ..figure })
+}
+
+/// The scales of a figure over a parameter.
+struct AxisScales {
+    x: Scale,
+    y: Scale,
+}
+
+/// Least ratio of the ends of an axis for a logarithmic scale.
+const MIN_LOG_RATIO: f64 = 8.0;
+/// Least ratio of the widest to the narrowest step between levels: levels that multiply have such, levels that add have not.
+const MIN_STEP_RATIO: f64 = 3.0;
+
+impl AxisScales {
+    /// Returns logarithmic scales for levels that multiply, as 8, 16, 32, and for values that do so over them, too.
+    fn choose(parameter: &Parameter, series: &[Series]) -> Self {
+        let mut scales = Self { x: Scale::Linear, y: Scale::Linear };
+        let mut levels = Vec::with_capacity(parameter.levels.len());
+        for level in &parameter.levels {
+            if let Level::Number(value) = level {
+                levels.push(*value);
+            }
+        }
+        let steps: Vec<f64> = levels.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let is_multiplied = ratio(&steps).is_some_and(|ratio| ratio >= MIN_STEP_RATIO);
+        let is_wide = ratio(&levels).is_some_and(|ratio| ratio >= MIN_LOG_RATIO);
+        if !is_multiplied || !is_wide {
+            return scales;
+        }
+        scales.x = Scale::Log;
+        let points = series.iter().flat_map(|s| &s.points);
+        let ends: Vec<f64> = points.map(|p| p.interval.map_or(p.y, |(low, _)| low)).collect();
+        if ratio(&ends).is_some_and(|ratio| ratio >= MIN_LOG_RATIO) {
+            scales.y = Scale::Log;
+        }
+        scales
+    }
+
+    /// Returns the exponent with which a single series grows, as text; `None` where an axis is linear.
+    fn slope(&self, series: &[Series]) -> Option<String> {
+        let [only] = series else { return None };
+        if (self.x, self.y) != (Scale::Log, Scale::Log) {
+            return None;
+        }
+        let rows: Vec<Vec<f64>> = only.points.iter().map(|p| vec![1.0, math::ln(p.x)]).collect();
+        let logarithms: Vec<f64> = only.points.iter().map(|p| math::ln(p.y)).collect();
+        let fit = Fit::new(&rows, &logarithms)?;
+        let interval = fit.intervals.as_ref().map(|intervals| intervals[1]);
+        let slope = with_interval(Some(fit.coefficients[1]), interval);
+        Some(format!("Slope of a straight line through the means on these axes: {slope}."))
+    }
+}
+
+/// Returns the largest of some positive numbers divided by the least; `None` for fewer than two, or one that is not positive.
+fn ratio(values: &[f64]) -> Option<f64> {
+    let low = values.iter().copied().reduce(f64::min)?;
+    let high = values.iter().copied().reduce(f64::max)?;
+    (values.len() > 1 && low > 0.0).then(|| high / low)
 }
 
 /// Returns the means of some variants at each level of a parameter.
@@ -156,8 +228,8 @@ fn line_points(
 /// Words have no value, and stand at their number.
 fn level_position(groups: &RunGroups<'_>, parameter: usize, level: usize) -> f64 {
     match groups.parameters[parameter].levels[level] {
-        super::groups::Level::Number(value) => value,
-        super::groups::Level::Text(_) => level as f64,
+        Level::Number(value) => value,
+        Level::Text(_) => level as f64,
     }
 }
 
@@ -242,13 +314,23 @@ fn short_number(value: f64) -> String {
 }
 
 fn variant_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Figure {
+    if let Some(figure) = run_figure(groups, metric) {
+        return figure;
+    }
     let points = (0..groups.variants.len())
         .filter_map(|variant| groups.mean_over(metric, &[variant]).point(variant as f64))
         .collect();
     let figure = figure(groups, metric, capitalized(&groups.label(metric)), "variant".into());
-    let kind = FigureKind::Bars { categories: groups.variants.clone() };
+    let kind = FigureKind::Dots { categories: groups.variants.clone() };
     let series = vec![Series { name: String::new(), points }];
     Figure { note: means_note(groups), kind, series, ..figure }
+}
+
+/// Returns the single runs of the variants with their means, if they have room.
+fn run_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<Figure> {
+    let figure = boxed_runs(groups, metric)?;
+    let note = format!("{} {}", means_note(groups), figure.note);
+    Some(Figure { note, ..figure })
 }
 
 /// Returns the share of runs up to each value, with Wilson's intervals; `None` for a share of runs.
@@ -272,6 +354,7 @@ fn distribution_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<Fig
         note: format!("95 % intervals, n = {n}."),
         x_label: label.to_string(),
         y_label: "share of runs up to it".into(),
+        kind: FigureKind::Steps,
         series: vec![Series { name: String::new(), points }],
         ..Figure::default()
     })

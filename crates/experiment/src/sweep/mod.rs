@@ -24,7 +24,10 @@
 //! options.rs   options of a summary
 //! plan_summary.rs  a plan's runs -> their summary
 //! text.rs      the summary as tables
-//! charts.rs    the summary as figures
+//! charts.rs    the summary as figures: each metric over each parameter
+//! run_charts.rs    the runs of variants: joined by seed, differences, boxes, shares up to a value
+//! forest_chart.rs  all comparisons against zero
+//! lead_charts.rs   the first page: the figures that show what differs
 //! ```
 //!
 //! The unit of work is a *trial*: a variant and a seed. Replicate `k` of every variant has the same
@@ -38,14 +41,17 @@ pub mod column_schema;
 pub mod compare;
 pub mod design;
 pub mod file;
+mod forest_chart;
 mod groups;
 pub mod label;
+mod lead_charts;
 mod options;
 mod overrides;
 pub mod plan;
 mod plan_summary;
 pub mod rounds;
 pub mod rows;
+mod run_charts;
 pub mod scheduler;
 pub mod seeds;
 pub mod series;

@@ -12,6 +12,7 @@
 use super::charts;
 use super::compare::{BaselineIndex, Comparison, comparisons};
 use super::groups::{Level, RunGroups};
+use super::lead_charts::{self, LeadContext};
 use super::options::{BaselineChoice, SummaryOptions};
 use super::summary::{
     Effect, EffectLevel, MetricSummary, MetricValues, NOT_REQUESTED, NumericSummary, OmittedMetric,
@@ -74,6 +75,12 @@ impl Summary {
         let trends =
             if charts::is_sampled(&groups) { trends(&groups, &columns) } else { Vec::new() };
         adjust_p_values(&mut metrics);
+        let lead = lead_charts::figures(&LeadContext {
+            groups: &groups,
+            columns: &columns,
+            metrics: &metrics,
+            reference: reference.as_ref(),
+        });
         let mut summary = Self {
             runs: table.runs(),
             variants: (0..groups.variants.len()).map(|v| variant_summary(&groups, v)).collect(),
@@ -82,6 +89,7 @@ impl Summary {
             left_out,
             trends,
             notes: Vec::new(),
+            lead,
             figures,
             parameters: groups.parameters.clone(),
         };

@@ -183,6 +183,8 @@ pub struct Summary {
     /// Remarks that a reader must know.
     pub notes: Vec<String>,
     #[serde(skip)]
+    pub(super) lead: Vec<Figure>,
+    #[serde(skip)]
     pub(super) figures: Vec<(String, Figure)>,
 }
 

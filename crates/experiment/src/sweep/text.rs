@@ -54,6 +54,11 @@ impl Summary {
         omitted_metrics(self)
     }
 
+    /// Returns the figures of the first page: at most six, which show what differs.
+    pub fn lead_figures(&self) -> &[Figure] {
+        &self.lead
+    }
+
     /// Returns the summary as figures: each metric over each parameter.
     pub fn figures(&self) -> Vec<Figure> {
         self.figures.iter().map(|(_, figure)| figure.clone()).collect()
@@ -154,7 +159,7 @@ fn difference_cells(metric: &MetricSummary, variant: &str) -> [String; 2] {
 }
 
 /// Returns the difference of a variant from its baseline; alone where seeds change nothing.
-fn difference(comparison: &Comparison) -> String {
+pub(super) fn difference(comparison: &Comparison) -> String {
     match comparison.difference {
         Some(difference) if comparison.seedless => format_number(difference, Some(0.0)),
         difference => with_interval(difference, comparison.interval),
@@ -423,7 +428,7 @@ fn format_number(value: f64, half_width: Option<f64>) -> String {
     if text.trim_matches(['-', '0', '.']).is_empty() { text.replace('-', "") } else { text }
 }
 
-fn format_p_value(p: f64) -> String {
+pub(super) fn format_p_value(p: f64) -> String {
     if p < 0.0001 { "< 0.0001".into() } else { format!("{p:.4}") }
 }
 

@@ -1,4 +1,4 @@
-//! Interactive figures with a static version beneath, and pictures.
+//! Figures, whose marks tell their values, and pictures.
 
 use super::tables;
 use crate::SvgFile;
@@ -6,38 +6,84 @@ use maud::{Markup, PreEscaped, html};
 use serde_json::json;
 use sidestep_document::document::Picture;
 use sidestep_document::{Figure, FigureKind, Table};
-use sidestep_draw::series_colors;
+use sidestep_draw::{DARK_COLORS, Spot};
 
 /// Maximum number of points of a figure with a table of its numbers: a longer table helps no reader, and the numbers are in
 /// the page as JSON anyway.
 const MAX_TABLE_ROWS: usize = 200;
 
 pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Markup {
-    let data = json!({ "figure": figure, "colors": series_colors() });
+    let chart = html! { @if let Some(still) = still { (chart(figure, still)) } };
+    let class = if has_full_width(figure) { "plot full" } else { "plot" };
     html! {
-        figure .plot id=(id) {
-            figcaption { (figure.title) }
-            @if let Some(still) = still {
-                (image(&still.svg, Some("still"), &alt_text(figure)))
-            }
-            div .drawn hidden {}
-            script type="application/json" { (PreEscaped(safe_json(&data))) }
-            @if !figure.note.is_empty() { p .note { (figure.note) } }
-            @if let Some(numbers) = numbers_table(figure) {
-                details .numbers {
-                    summary { "Numbers" }
-                    (tables::wide_table(&format!("numbers of {}", figure.title), tables::grid(&numbers, None)))
-                }
+        figure class=(class) id=(id) {
+            @if figure.is_folded {
+                details .chart-fold { summary { (figure.title) } (chart) }
+            } @else {
+                figcaption { (figure.title) }
+                (chart)
             }
         }
     }
+}
+
+/// Returns whether a figure has a row of the page for itself: names and words stand beside its data.
+fn has_full_width(figure: &Figure) -> bool {
+    matches!(figure.kind, FigureKind::Forest { .. })
+}
+
+/// Returns the drawing of a figure, what its marks say where the pointer is, and its numbers.
+fn chart(figure: &Figure, still: &SvgFile) -> Markup {
+    let spots: Vec<_> = still.spots.iter().map(spot_json).collect();
+    let data = json!({ "figure": figure, "spots": spots });
+    html! {
+        div .canvas { (inline_svg(&still.svg, &alt_text(figure))) }
+        script type="application/json" { (PreEscaped(safe_json(&data))) }
+        @if !figure.note.is_empty() { p .note { (figure.note) } }
+        @if let Some(numbers) = numbers_table(figure) {
+            details .numbers {
+                summary { "Numbers" }
+                (tables::wide_table(&format!("numbers of {}", figure.title), tables::grid(&numbers, None)))
+            }
+        }
+    }
+}
+
+/// Returns the style of figures on a dark ground: a drawing is written once, in the colors for white paper.
+pub(super) fn dark_style() -> String {
+    let mut rules = String::new();
+    for (light, dark) in DARK_COLORS {
+        for property in ["fill", "stroke"] {
+            let selector = format!("[{property}=\"{light}\"]");
+            rules += &format!(".chart{selector},.chart {selector}{{{property}:{dark}}}");
+        }
+    }
+    format!("@media screen and (prefers-color-scheme:dark){{{rules}}}")
+}
+
+/// Returns a mark as its place in the drawing, and the numbers of its series and its point.
+fn spot_json(spot: &Spot) -> serde_json::Value {
+    let tenths = |px: f64| (px * 10.0).round() / 10.0;
+    json!([tenths(spot.x_px), tenths(spot.y_px), spot.series, spot.point])
+}
+
+/// Returns a drawing as a part of the page. Its own title would be shown beside the values of its marks, so it becomes
+/// the name of the drawing.
+fn inline_svg(svg: &str, alt: &str) -> Markup {
+    // Escaped by maud.
+    let alt = html! { (alt) }.into_string();
+    let (head, rest) = svg.split_once("<title>").unwrap_or((svg, ""));
+    let body = rest.split_once("</title>").map_or(rest, |(_, body)| body);
+    let head = head.replacen("<svg ", &format!("<svg class=\"chart\" aria-label=\"{alt}\" "), 1);
+    // No line ends are needed between elements.
+    html! { (PreEscaped(format!("{head}{body}").replace(">\n", ">"))) }
 }
 
 pub(super) fn picture(picture: &Picture, id: &str) -> Markup {
     html! {
         figure .picture id=(id) {
             figcaption { (picture.title) }
-            (image(&picture.svg, None, &format!("{}. {}", picture.title, picture.caption)))
+            (image(&picture.svg, &format!("{}. {}", picture.title, picture.caption)))
             @if !picture.caption.is_empty() { p .note { (picture.caption) } }
         }
     }
@@ -58,16 +104,15 @@ fn numbers_table(figure: &Figure) -> Option<Table> {
         return None;
     }
     let mut table = Table::new("", "", &["series"]);
-    table.columns.push(figure.x_label.clone());
-    table.columns.push(figure.y_label.clone());
+    let [x_label, y_label] = figure.column_labels();
+    table.columns.push(x_label.into());
+    table.columns.push(y_label.into());
     table.columns.extend(["from", "to", "n"].map(String::from));
     for series in &figure.series {
         for point in &series.points {
-            let x = match &figure.kind {
-                FigureKind::Bars { categories } => {
-                    categories.get(point.x as usize).cloned().unwrap_or_default()
-                }
-                _ => point.x.to_string(),
+            let x = match figure.position_names() {
+                Some(names) => names.get(point.x as usize).cloned().unwrap_or_default(),
+                None => point.x.to_string(),
             };
             let (low, high) = match point.interval {
                 Some((low, high)) => (format_short(low), format_short(high)),
@@ -92,12 +137,11 @@ fn safe_json(value: &serde_json::Value) -> String {
 }
 
 /// Returns an image whose address is an SVG.
-fn image(svg: &str, class: Option<&str>, alt: &str) -> Markup {
-    let class = class.map_or_else(String::new, |class| format!(" class=\"{class}\""));
+fn image(svg: &str, alt: &str) -> Markup {
     // Escaped by maud.
     let alt = html! { (alt) }.into_string();
     // In single quotes, of which pictures have few: every double one would take three bytes.
-    html! { (PreEscaped(format!("<img{class} src='{}' alt=\"{alt}\">", data_uri(svg)))) }
+    html! { (PreEscaped(format!("<img src='{}' alt=\"{alt}\">", data_uri(svg)))) }
 }
 
 /// Returns an SVG as the address of an image, for an attribute in single quotes. Addresses take marks of
@@ -138,10 +182,10 @@ mod tests {
     #[test]
     fn nothing_in_a_picture_ends_its_address_or_its_attribute() {
         let image =
-            image("<a b=\"#1\">50 % &amp; 'c'</a>\n", Some("still"), "\"A\" & <b>").into_string();
+            image("<a b=\"#1\">50 % &amp; 'c'</a>\n", "\"A\" & <b>").into_string();
         assert_eq!(
             image,
-            "<img class=\"still\" src='data:image/svg+xml;charset=utf-8,<a b=\"%231\">50 %25 %26amp; \
+            "<img src='data:image/svg+xml;charset=utf-8,<a b=\"%231\">50 %25 %26amp; \
              %27c%27</a>' alt=\"&quot;A&quot; &amp; &lt;b&gt;\">"
         );
     }

@@ -3,8 +3,7 @@
 //! ```text
 //! blocks.rs    the blocks of a document      figures.rs   figures and pictures
 //! tables.rs    tables and claims             page.css     style
-//! page.js      sorting of tables             axes.js      ranges and ticks of figures
-//! figures.js   figures from their data       mouse.js     reactions to the mouse
+//! page.js      sorting of tables             hover.js     values of marks where the pointer is
 //! ```
 
 mod blocks;
@@ -18,17 +17,15 @@ use sidestep_document::document::{Block, Span, Text};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
-/// The script that draws figures; a page without figures does not contain it.
-const FIGURES_SCRIPT: &str =
-    concat!(include_str!("axes.js"), include_str!("figures.js"), include_str!("mouse.js"));
+/// The script that shows the values of marks; a page without figures does not contain it.
+const HOVER_SCRIPT: &str = include_str!("hover.js");
 
 /// Security policy: nothing may be loaded; inline styles and scripts may be used.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'";
 
 /// A hint on how to use figures with a mouse.
-const HINT: &str = "Figures: point at a mark for its values, drag to zoom, double-click to see \
-                    all again, click a name in a legend to hide or show its series.";
+const HINT: &str = "Figures: point at a mark for its values.";
 
 /// Minimum number of sections for a table of contents: fewer are found by scrolling.
 const MIN_CONTENTS_SECTIONS: usize = 3;
@@ -50,7 +47,7 @@ pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
                 meta name="description" content=(document.lead.plain_text());
                 meta name="generator" content={ "sidestep " (env!("CARGO_PKG_VERSION")) };
                 title { (document.title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(figures::dark_style())) }
             }
             body class=[has_contents.then_some("has-contents")] {
                 header {
@@ -64,7 +61,7 @@ pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
                         ". This file is complete in itself and loads nothing." }
                     @if has_figures { p .screen { (HINT) } }
                 }
-                @if has_figures { script { (PreEscaped(FIGURES_SCRIPT)) } }
+                @if has_figures { script { (PreEscaped(HOVER_SCRIPT)) } }
                 script { (PreEscaped(SCRIPT)) }
             }
         }
@@ -109,7 +106,19 @@ impl<'a> PageSection<'a> {
     }
 
     fn markup(&self) -> Markup {
-        let parts = html! { @for part in &self.blocks { (blocks::markup(part)) } };
+        let is_figure = |part: &PageBlock<'_>| matches!(part.block, Block::Figure(_));
+        // Figures in a row stand beside each other.
+        let groups: Vec<&[PageBlock<'_>]> =
+            self.blocks.chunk_by(|a, b| is_figure(a) && is_figure(b)).collect();
+        let parts = html! {
+            @for group in groups {
+                @if is_figure(&group[0]) {
+                    div .plots { @for part in group { (blocks::markup(part)) } }
+                } @else {
+                    @for part in group { (blocks::markup(part)) }
+                }
+            }
+        };
         html! {
             @match self.title {
                 None => section { (parts) },

@@ -3,7 +3,7 @@
 use super::text::{format_count, format_duration};
 use crate::sweep::{FinishedRuns, Folder, read_finished, run_picture};
 use crate::{Error, Watcher};
-use sidestep_document::Table;
+use sidestep_document::{Figure, Table};
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
 use sidestep_experiment::sweep::rounds::{VariantStop, variant_stops};
 use sidestep_experiment::sweep::{Plan, Role, RunTable, Summary, Trial, Variant};
@@ -170,10 +170,11 @@ fn reproduction_commands(folder: &Folder) -> String {
     )
 }
 
-/// Appends one table of everything, then every metric in a section of its own: its figures, and its tables
-/// folded.
+/// Appends the figures that show what differs and one table of everything, then every metric in a section of its own: its
+/// other figures and its tables, folded.
 fn append_results(document: &mut Document, summary: &Summary) {
-    document.section("Results").tables([summary.overview()]);
+    document.section("Results").figures(summary.lead_figures().iter().cloned());
+    document.tables([summary.overview()]);
     for note in &summary.notes {
         document.paragraph(note.as_str());
     }
@@ -184,7 +185,9 @@ fn append_results(document: &mut Document, summary: &Summary) {
             "" => name.append("."),
             meaning => name.append(format!(": {meaning}.")),
         });
-        document.figures(section.figures).tables(section.tables);
+        let is_lead = |figure: &Figure| summary.lead_figures().contains(figure);
+        let others = section.figures.into_iter().filter(|figure| !is_lead(figure));
+        document.figures(others.map(Figure::folded)).tables(section.tables);
     }
 }
 

@@ -1,0 +1,253 @@
+//! A forest: effects with their intervals, one below the other, against zero.
+
+use crate::axis::{Axis, Scale};
+use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks};
+use crate::chart::{DrawnChart, level_error_bar};
+use crate::error::DrawError;
+use crate::legend::{LegendEntry, LegendSymbol, Marker};
+use crate::style::{GROUND, INK, Style, series_color};
+use crate::svg::{Anchor, TextStyle};
+use crate::text::{self, Weight};
+
+/// Height of a line of a row as a multiple of the size of its text.
+const LINE: f64 = 1.5;
+/// Gap between the area and the text beside it.
+const TEXT_GAP_PX: f64 = 10.0;
+/// Radius of a mark as a multiple of the size of small text.
+const MARK_FRACTION: f64 = 0.42;
+/// An end of an interval farther from zero than this multiple of the third quartile of all ends is cut off, with an
+/// arrow: one large effect would press all others against zero.
+const MAX_SPREAD: f64 = 3.0;
+/// Largest fraction of the width for the text beside the effects; without that room it is left out.
+const MAX_TEXT_FRACTION: f64 = 0.4;
+
+/// An effect in one row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForestMark {
+    /// The effect in units of the axis; one that is not a number has only its text.
+    pub value: f64,
+    /// Lower and upper end of its interval. The mark of an effect whose interval has zero in it is hollow.
+    pub interval: Option<(f64, f64)>,
+    /// The effect in words, which stand on the right.
+    pub text: String,
+}
+
+/// Effects of one color: one in each row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForestSeries {
+    /// Label in the legend.
+    pub label: String,
+    /// One effect per row, in their order.
+    pub marks: Vec<ForestMark>,
+}
+
+/// A chart of effects against zero, e.g. of differences between two variants in many quantities.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForestChart {
+    title: String,
+    note: String,
+    x: Axis,
+    rows: Vec<String>,
+    series: Vec<ForestSeries>,
+}
+
+impl ForestChart {
+    /// Returns an empty chart with these rows from top to bottom, over an axis of effects.
+    pub fn new(
+        title: impl Into<String>,
+        x: Axis,
+        rows: impl IntoIterator<Item = impl Into<String>>,
+    ) -> Self {
+        Self {
+            title: title.into(),
+            note: String::new(),
+            x,
+            rows: rows.into_iter().map(Into::into).collect(),
+            series: vec![],
+        }
+    }
+
+    /// Adds a series.
+    #[must_use]
+    pub fn series(mut self, series: ForestSeries) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// Sets the small print under the chart.
+    #[must_use]
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// Draws the chart. It is as high as its rows need, whatever the height of the style.
+    ///
+    /// # Errors
+    /// [`DrawError::Length`] if a series has not one effect per row, [`DrawError::Value`] if the style or the axis's
+    /// given range is impossible.
+    pub fn draw(&self, style: &Style) -> Result<DrawnChart, DrawError> {
+        style.check()?;
+        for series in &self.series {
+            DrawError::length("effects of a series", self.rows.len(), series.marks.len())?;
+        }
+        let limit = self.limit();
+        let shown = self.ends().map(|end| end.clamp(-limit, limit));
+        let beside_px = self.beside_px(style);
+        // The axis has less room than that of other charts.
+        let across = max_ticks(&Style { width_px: 0.55 * style.width_px, ..*style }).0;
+        let x = self.x.fit(shown.chain([0.0]), across)?;
+        let words = FrameText {
+            title: &self.title,
+            note: &self.note,
+            x_label: self.x.label(),
+            legend: self.legend(),
+            beside_px,
+            rows_px: self.rows.len() as f64 * self.row_px(style),
+            ..FrameText::default()
+        };
+        let rows = crate::axis::FittedAxis::rows(&self.rows);
+        let low_style = Style { height_px: MIN_HEIGHT_PX, ..*style };
+        let across = XAxis::Values(x.clone());
+        let mut frame = ChartFrame::open(&low_style, words, &across, &rows);
+        let x_scale = frame.x_scale(&x);
+        let area = frame.area;
+        let zero = x_scale.px(0.0);
+        frame.svg.line(
+            (zero, area.y),
+            (zero, area.bottom()),
+            format_args!(r#"stroke="{INK}" stroke-width="1.2""#),
+        );
+        for index in 0..self.series.len() {
+            self.draw_series(&mut frame, x_scale, index, (style, beside_px > 0.0));
+        }
+        Ok(frame.finish())
+    }
+
+    /// Returns the number of lines of a row: names of quantities may take two.
+    fn row_px(&self, style: &Style) -> f64 {
+        let lines = self.series.len().max(1) as f64 + 0.6;
+        lines.max(2.0) * LINE * style.small_px()
+    }
+
+    fn marks(&self) -> impl Iterator<Item = &ForestMark> {
+        self.series.iter().flat_map(|series| &series.marks)
+    }
+
+    /// Returns all values and ends of intervals.
+    fn ends(&self) -> impl Iterator<Item = f64> {
+        let of_mark = |mark: &ForestMark| {
+            let (low, high) = mark.interval.unwrap_or((mark.value, mark.value));
+            [low, mark.value, high]
+        };
+        self.marks().flat_map(of_mark).filter(|end| end.is_finite())
+    }
+
+    /// Returns the distance from zero beyond which effects are cut off.
+    fn limit(&self) -> f64 {
+        let mut distances: Vec<f64> = self.ends().map(f64::abs).collect();
+        distances.sort_by(f64::total_cmp);
+        let third_quartile = distances.get(distances.len() * 3 / 4).copied().unwrap_or(0.0);
+        if third_quartile > 0.0 { MAX_SPREAD * third_quartile } else { f64::INFINITY }
+    }
+
+    /// Returns the room for the text beside the effects; 0 if it is left out.
+    fn beside_px(&self, style: &Style) -> f64 {
+        let width = |mark: &ForestMark| text::width(&mark.text, style.small_px(), Weight::Regular);
+        let widest = self.marks().map(width).fold(0.0, f64::max);
+        let fits = widest > 0.0 && widest <= MAX_TEXT_FRACTION * style.width_px;
+        if fits { widest + TEXT_GAP_PX } else { 0.0 }
+    }
+
+    /// A single series needs no legend.
+    fn legend(&self) -> Vec<LegendEntry> {
+        if self.series.len() < 2 {
+            return vec![];
+        }
+        let entry = |(index, series): (usize, &ForestSeries)| {
+            let color = series_color(index).into();
+            let marker = Marker::of_series(index);
+            LegendEntry::new(LegendSymbol::Marker { color, marker }, &series.label)
+        };
+        self.series.iter().enumerate().map(entry).collect()
+    }
+
+    fn draw_series(
+        &self,
+        frame: &mut ChartFrame,
+        x: Scale,
+        index: usize,
+        (style, has_text): (&Style, bool),
+    ) {
+        let size = style.small_px();
+        let aside = (index as f64 - (self.series.len() as f64 - 1.0) / 2.0) * LINE * size;
+        let color = series_color(index);
+        let text_style = TextStyle { fill: INK, ..TextStyle::new(size, Anchor::Start) };
+        for (row, mark) in self.series[index].marks.iter().enumerate() {
+            let y = frame.y.px(self.rows.len() as f64 - 0.5 - row as f64) + aside;
+            let text_x = frame.area.right() + TEXT_GAP_PX;
+            if has_text {
+                frame.svg.text(text_x, y + text_style.middle_px(), &mark.text, &text_style);
+            }
+            if mark.value.is_finite() {
+                let place = MarkPlace { x, y, radius: MARK_FRACTION * size };
+                place.draw(frame, mark, Marker::of_series(index), &color);
+                let at = x.px(mark.value).clamp(frame.area.x, frame.area.right());
+                frame.push_spot((at, y), index, row);
+            }
+        }
+    }
+}
+
+/// Least height that a style may have: the rows decide.
+const MIN_HEIGHT_PX: f64 = 100.0;
+
+/// Where a mark is drawn.
+struct MarkPlace {
+    x: Scale,
+    y: f64,
+    radius: f64,
+}
+
+impl MarkPlace {
+    /// Draws an effect and its interval; what lies outside of the area becomes an arrow at its edge.
+    fn draw(&self, frame: &mut ChartFrame, mark: &ForestMark, marker: Marker, color: &str) {
+        let (left, right) = (frame.area.x, frame.area.right());
+        let interval = mark.interval.filter(|(low, high)| low.is_finite() && high.is_finite());
+        if let Some((low, high)) = interval {
+            let ends = (self.x.px(low).max(left), self.x.px(high).min(right));
+            if ends.0 < ends.1 {
+                level_error_bar(&mut frame.svg, self.y, ends, 0.6 * self.radius, color);
+            }
+        }
+        let (low, high) = interval.unwrap_or((mark.value, mark.value));
+        if self.x.px(low) < left - 0.5 {
+            self.arrow(frame, left, -1.0, color);
+        }
+        if self.x.px(high) > right + 0.5 {
+            self.arrow(frame, right, 1.0, color);
+        }
+        let at = self.x.px(mark.value);
+        if at < left - 0.5 || at > right + 0.5 {
+            return;
+        }
+        let has_zero = interval.is_none_or(|(low, high)| low <= 0.0 && high >= 0.0);
+        marker.draw(&mut frame.svg, (at, self.y), self.radius, color);
+        if has_zero {
+            // The same marker, smaller and in the color of the ground, leaves a rim.
+            marker.draw(&mut frame.svg, (at, self.y), 0.55 * self.radius, GROUND);
+        }
+    }
+
+    /// Draws the head of an arrow that points out of the area.
+    fn arrow(&self, frame: &mut ChartFrame, edge: f64, side: f64, color: &str) {
+        let tip = edge + side * self.radius;
+        let back = edge - side * self.radius;
+        let (top, bottom) = (self.y - self.radius, self.y + self.radius);
+        let data = crate::chart::frame::polyline(
+            [(tip, self.y), (back, top), (back, bottom)].into_iter(),
+        ) + "Z";
+        frame.svg.path(&data, format_args!(r#"fill="{color}""#));
+    }
+}
+
