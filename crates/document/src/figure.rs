@@ -143,6 +143,16 @@ impl Figure {
         }
     }
 
+    /// Returns the same names, to be replaced.
+    pub fn position_names_mut(&mut self) -> &mut [String] {
+        match &mut self.kind {
+            FigureKind::Bars { categories } | FigureKind::Dots { categories } => categories,
+            FigureKind::Forest { rows, .. } => rows,
+            FigureKind::Heat { columns, .. } => columns,
+            _ => &mut [],
+        }
+    }
+
     /// Returns the names of the positions and of the values of its points, as heads of columns.
     pub fn column_labels(&self) -> [&str; 2] {
         match &self.kind {
@@ -153,6 +163,32 @@ impl Figure {
         }
     }
 
+    /// Returns the points as a table of comma-separated values with a head: the series, the position, the value, the ends of
+    /// its interval and of that of the position, and the number of runs; what a point has not is empty.
+    pub fn csv(&self) -> String {
+        let [x, y] = self.column_labels().map(csv_cell);
+        let mut text = format!("series,{x},{y},low,high,x_low,x_high,n\n");
+        let number = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
+        let ends = |interval: Option<(f64, f64)>| match interval {
+            Some((low, high)) => [number(low), number(high)],
+            None => Default::default(),
+        };
+        for series in &self.series {
+            for point in &series.points {
+                let x = match self.position_names() {
+                    Some(names) => names.get(point.x as usize).map_or("", String::as_str),
+                    None => &number(point.x),
+                };
+                let [low, high] = ends(point.interval);
+                let [x_low, x_high] = ends(point.x_interval);
+                let n = point.n.map_or(String::new(), |n| n.to_string());
+                let (name, x, y) = (csv_cell(&series.name), csv_cell(x), number(point.y));
+                text += &format!("{name},{x},{y},{low},{high},{x_low},{x_high},{n}\n");
+            }
+        }
+        text
+    }
+
     /// Adds a note on its intervals: those that an [`Estimate`](super::Estimate) gives.
     #[must_use]
     pub fn with_interval_note(mut self) -> Self {
@@ -161,6 +197,14 @@ impl Figure {
         }
         self
     }
+}
+
+/// Returns a cell of a table of comma-separated values (RFC 4180): in quotes where it has a mark of these.
+fn csv_cell(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        return format!("\"{}\"", text.replace('"', "\"\""));
+    }
+    text.to_string()
 }
 
 impl Point {
@@ -228,5 +272,28 @@ impl Table {
     /// Returns the cells of a row, one per column.
     pub fn cells<'a>(&'a self, row: &'a [String]) -> impl Iterator<Item = &'a str> {
         (0..self.columns.len()).map(|k| row.get(k).map_or("", String::as_str))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_data_of_a_figure_have_the_names_of_its_positions_and_empty_cells_for_what_is_not_there() {
+        let points = vec![
+            Point::new(0.0, 1.5).with_interval(Some((1.0, 2.0))).with_runs(4),
+            Point::new(1.0, f64::NAN),
+        ];
+        let figure = Figure {
+            x_label: "kind".into(),
+            y_label: "hits, all".into(),
+            kind: FigureKind::Bars { categories: vec!["a \"wall\"".into(), "door".into()] },
+            series: vec![Series { name: "calm".into(), points }],
+            ..Figure::default()
+        };
+        let expected = "series,kind,\"hits, all\",low,high,x_low,x_high,n\n\
+                        calm,\"a \"\"wall\"\"\",1.5,1,2,,,4\ncalm,door,,,,,,\n";
+        assert_eq!(figure.csv(), expected);
     }
 }

@@ -10,6 +10,7 @@ use crate::error::DrawError;
 use crate::picture::canvas::{Camera, Canvas};
 use crate::picture::{Scene, animation_bounds, check_content, projected_bounds};
 use crate::raster::parse;
+use crate::text::Fonts;
 use crate::svg::{Anchor, Rect, Svg, TextStyle};
 
 /// Shortest side of a picture, pixels: below it a long and narrow world would leave nothing to see.
@@ -88,7 +89,8 @@ impl AnimationRenderer {
     fn composite(&self, svg: Svg) -> Result<Pixmap, DrawError> {
         let mut picture = self.background.clone();
         let (width, height) = self.size_px();
-        let tree = parse(&svg.finish_transparent(f64::from(width), f64::from(height)))?;
+        let svg = svg.finish_transparent(f64::from(width), f64::from(height));
+        let tree = parse(&svg, &Fonts::default())?;
         resvg::render(&tree, Transform::identity(), &mut picture.as_mut());
         Ok(picture)
     }

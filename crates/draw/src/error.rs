@@ -40,6 +40,12 @@ pub enum DrawError {
     /// The PNG encoder failed.
     #[error("the PNG cannot be encoded: {0}")]
     Png(String),
+    /// Bytes that are no font.
+    #[error("not a font of TrueType or OpenType")]
+    Font,
+    /// The content of a PDF cannot be compressed.
+    #[error("the PDF cannot be written: {0}")]
+    Pdf(String),
 }
 
 impl DrawError {

@@ -35,6 +35,7 @@ mod error;
 #[cfg(test)]
 mod layout_tests;
 mod legend;
+mod pdf;
 mod picture;
 mod raster;
 mod style;
@@ -55,6 +56,8 @@ pub use chart::slots::{QuartileBox, Slot, SlotChart};
 pub use chart::{DrawnChart, Spot};
 pub use error::DrawError;
 pub use picture::{PictureOptions, bodies_with_trails, describe, draw};
-pub use raster::to_png;
+pub use pdf::to_pdf;
+pub use raster::{to_png, to_png_with_density};
 pub use style::{Style, series_colors};
+pub use text::Fonts;
 pub use theme::{DARK_COLORS, to_dark};

@@ -6,6 +6,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use crate::error::DrawError;
 use resvg::usvg::fontdb;
 use skrifa::{FontRef, MetadataProvider, instance::LocationRef, instance::Size};
 
@@ -17,6 +18,45 @@ pub(crate) const FAMILIES: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-
 pub(crate) enum Weight {
     Regular,
     Bold,
+}
+
+/// The fonts that pictures are drawn with as PNG and PDF.
+#[derive(Debug, Clone)]
+pub struct Fonts {
+    pub(crate) database: Arc<fontdb::Database>,
+    family: Option<String>,
+}
+
+impl Default for Fonts {
+    /// Returns the embedded DejaVu Sans alone.
+    fn default() -> Self {
+        Self { database: fonts(), family: None }
+    }
+}
+
+impl Fonts {
+    /// Returns the embedded font, and before it the font of a file, as TrueType or OpenType: pictures in it are laid out
+    /// for DejaVu Sans, which is wider than most.
+    ///
+    /// # Errors
+    /// [`DrawError::Font`] if the bytes are no such font.
+    pub fn from_file_bytes(bytes: Vec<u8>) -> Result<Self, DrawError> {
+        let mut database = (*fonts()).clone();
+        let faces = database.load_font_source(fontdb::Source::Binary(Arc::new(bytes)));
+        let face = faces.first().and_then(|id| database.face(*id));
+        let family = face.and_then(|face| face.families.first());
+        let Some((family, _)) = family.cloned() else { return Err(DrawError::Font) };
+        // It stands in an attribute of the picture.
+        let family = family.replace(['"', '\'', '<', '>', '&', ','], " ");
+        Ok(Self { database: Arc::new(database), family: Some(family) })
+    }
+
+    /// Returns a picture that names these fonts for its text.
+    pub fn apply(&self, svg: &str) -> String {
+        let Some(family) = &self.family else { return svg.to_string() };
+        let embedded = format!("font-family=\"{FAMILIES}\"");
+        svg.replacen(&embedded, &format!("font-family=\"'{family}', {FAMILIES}\""), 1)
+    }
 }
 
 /// Returns the font database of `to_png`: DejaVu Sans, regular and bold, and nothing else.
@@ -95,6 +135,15 @@ mod tests {
     #[test]
     fn the_embedded_fonts_are_readable() {
         assert_eq!(fonts().len(), 2);
+    }
+
+    #[test]
+    fn a_picture_names_the_font_of_a_file() {
+        let fonts = Fonts::from_file_bytes(dejavu::sans::bold().to_vec()).unwrap();
+        let svg = format!("<svg font-family=\"{FAMILIES}\">");
+        assert!(fonts.apply(&svg).starts_with("<svg font-family=\"'DejaVu Sans', DejaVu"));
+        assert_eq!(Fonts::default().apply(&svg), svg);
+        assert!(matches!(Fonts::from_file_bytes(vec![1, 2, 3]), Err(DrawError::Font)));
     }
 
     #[test]

@@ -5,14 +5,14 @@ mod html;
 pub mod markdown;
 mod print;
 
-pub use print::PrintStyle;
+pub use print::{FigureLook, PrintFigure, PrintStyle};
 
 use sidestep_document::Document;
 use sidestep_document::document::Block;
 use sidestep_draw::{DrawError, DrawnChart, Spot};
 
 /// A report, ready to be stored.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RenderedReport {
     /// The page; self-contained.
     pub html: String,
@@ -23,14 +23,19 @@ pub struct RenderedReport {
 }
 
 /// A picture and its file name.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SvgFile {
     /// Name without its ending, e.g. `03-speed-up`.
     pub stem: String,
     /// The picture as a whole SVG document, which needs no other file.
     pub svg: String,
-    /// Where the marks of a figure are; a picture has none.
-    pub spots: Vec<Spot>,
+}
+
+/// A picture of a page.
+struct PagePicture {
+    file: SvgFile,
+    /// Where the marks of a figure are; a finished picture has none.
+    spots: Vec<Spot>,
 }
 
 /// Renders a document as page, text and pictures. `folder` is the folder of the pictures, as seen
@@ -40,15 +45,17 @@ pub struct SvgFile {
 /// When a figure cannot be drawn.
 pub fn render(document: &Document, folder: &str) -> Result<RenderedReport, DrawError> {
     let pictures = pictures(document)?;
+    let html = html::page(document, &pictures);
+    let pictures: Vec<SvgFile> = pictures.into_iter().map(|picture| picture.file).collect();
     Ok(RenderedReport {
-        html: html::page(document, &pictures),
+        html,
         markdown: markdown::text(document, folder, &pictures),
         pictures,
     })
 }
 
 /// Returns all figures and pictures, numbered in order.
-fn pictures(document: &Document) -> Result<Vec<SvgFile>, DrawError> {
+fn pictures(document: &Document) -> Result<Vec<PagePicture>, DrawError> {
     let mut files = Vec::new();
     for block in &document.blocks {
         let (title, DrawnChart { svg, spots }) = match block {
@@ -60,7 +67,7 @@ fn pictures(document: &Document) -> Result<Vec<SvgFile>, DrawError> {
         };
         // The number keeps the files of a folder in the order of the document, and tells equal titles apart.
         let stem = format!("{:02}-{}", files.len() + 1, slug(title));
-        files.push(SvgFile { stem, svg, spots });
+        files.push(PagePicture { file: SvgFile { stem, svg }, spots });
     }
     Ok(files)
 }

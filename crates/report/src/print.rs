@@ -3,17 +3,68 @@
 
 use crate::{SvgFile, chart, slug};
 use sidestep_document::document::Block;
-use sidestep_document::{Document, Figure, FigureKind};
-use sidestep_draw::{DrawError, Style};
+use sidestep_document::{Document, Figure};
+use sidestep_draw::{DrawError, DrawnChart, Style, to_dark};
 use std::collections::BTreeSet;
 
 /// Pixels of an SVG per millimeter, and per point.
 const PX_PER_MM: f64 = 96.0 / 25.4;
 const PX_PER_PT: f64 = 96.0 / 72.0;
 
+/// A figure for print.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PrintFigure {
+    /// The drawing and its name.
+    pub file: SvgFile,
+    /// The title, which is not in the drawing.
+    pub title: String,
+    /// Its data as comma-separated values.
+    pub csv: String,
+}
+
+/// Where figures are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FigureLook {
+    /// On paper, in the size of a column.
+    #[default]
+    Paper,
+    /// On a screen, from afar: lines and marks grow with the text.
+    Talk,
+    /// The same on a dark ground.
+    Dark,
+}
+
+impl FigureLook {
+    /// Returns the usual width and height in mm: a column of a journal, or a slide.
+    pub fn size_mm(self) -> [f64; 2] {
+        match self {
+            Self::Paper => [85.0, 60.0],
+            Self::Talk | Self::Dark => [240.0, 135.0],
+        }
+    }
+
+    /// Returns the usual size of text in points.
+    pub fn font_pt(self) -> f64 {
+        match self {
+            Self::Paper => 8.0,
+            Self::Talk | Self::Dark => 16.0,
+        }
+    }
+
+    /// Returns how much larger lines and marks are than on paper.
+    fn scale(self) -> f64 {
+        match self {
+            Self::Paper => 1.0,
+            Self::Talk | Self::Dark => 1.8,
+        }
+    }
+}
+
 /// The look of figures for print.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintStyle {
+    /// Where they are shown.
+    pub look: FigureLook,
     /// Width and height in mm.
     pub size_mm: [f64; 2],
     /// Size of text in points.
@@ -27,30 +78,38 @@ impl PrintStyle {
     ///
     /// # Errors
     /// When one cannot be drawn at this size.
-    pub fn figures(&self, document: &Document) -> Result<Vec<SvgFile>, DrawError> {
+    pub fn figures(&self, document: &Document) -> Result<Vec<PrintFigure>, DrawError> {
         let style = self.style();
-        let mut files = Vec::new();
+        let mut printed = Vec::new();
         for figure in figures(document) {
-            let chart = chart::draw_chart(&self.for_print(figure), &style)?;
-            let stem = format!("{:02}-{}", files.len() + 1, slug(&figure.title));
-            files.push(SvgFile { stem, svg: chart.svg, spots: chart.spots });
+            let for_print = self.for_print(figure);
+            let DrawnChart { svg, .. } = chart::draw_chart(&for_print, &style)?;
+            let svg = enlarged(&svg, self.look.scale());
+            let svg = if self.look == FigureLook::Dark { to_dark(&svg) } else { svg };
+            let stem = format!("{:02}-{}", printed.len() + 1, slug(&figure.title));
+            let file = SvgFile { stem, svg };
+            printed.push(PrintFigure { file, title: figure.title.clone(), csv: for_print.csv() });
         }
-        Ok(files)
+        Ok(printed)
     }
 
     /// Returns the labels that occur in no figure of a document.
     pub fn unused_labels<'a>(&'a self, document: &Document) -> Vec<&'a str> {
-        let used: BTreeSet<&str> = figures(document).flat_map(figure_labels).collect();
-        self.labels
-            .iter()
-            .map(|(from, _)| from.as_str())
-            .filter(|from| !used.contains(from))
-            .collect()
+        let used = Self::document_labels(document);
+        let labels = self.labels.iter().map(|(from, _)| from.as_str());
+        labels.filter(|from| !used.contains(from)).collect()
     }
 
+    /// Returns all labels of the figures of a document that can be replaced.
+    pub fn document_labels(document: &Document) -> BTreeSet<&str> {
+        figures(document).flat_map(figure_labels).filter(|label| !label.is_empty()).collect()
+    }
+
+    /// Returns the size and the text of a layout, which is enlarged afterwards.
     fn style(&self) -> Style {
-        let [width_px, height_px] = self.size_mm.map(|mm| (mm * PX_PER_MM).round());
-        Style { width_px, height_px, font_px: self.font_pt * PX_PER_PT }
+        let scale = self.look.scale();
+        let [width_px, height_px] = self.size_mm.map(|mm| (mm * PX_PER_MM / scale).round());
+        Style { width_px, height_px, font_px: self.font_pt * PX_PER_PT / scale }
     }
 
     /// Returns a figure without title and note, and with replaced labels.
@@ -61,8 +120,8 @@ impl PrintStyle {
         for series in &mut figure.series {
             self.replace_label(&mut series.name);
         }
-        if let FigureKind::Bars { categories } = &mut figure.kind {
-            categories.iter_mut().for_each(|category| self.replace_label(category));
+        for name in figure.position_names_mut() {
+            self.replace_label(name);
         }
         figure
     }
@@ -81,18 +140,23 @@ fn figures(document: &Document) -> impl Iterator<Item = &Figure> {
     })
 }
 
-/// Returns all labels of a figure: of its axes, its categories and its legend.
+/// Returns all labels of a figure: of its axes, its positions and its legend.
 fn figure_labels(figure: &Figure) -> impl Iterator<Item = &str> {
-    let categories = match &figure.kind {
-        FigureKind::Bars { categories } => &categories[..],
-        _ => &[],
-    };
+    let positions = figure.position_names().unwrap_or_default();
     let series = figure.series.iter().map(|series| &series.name);
-    [&figure.x_label, &figure.y_label]
-        .into_iter()
-        .chain(series)
-        .chain(categories)
-        .map(String::as_str)
+    let axes = [&figure.x_label, &figure.y_label].into_iter();
+    axes.chain(series).chain(positions).map(String::as_str)
+}
+
+/// Returns a drawing that is shown larger by a factor, with all its lines.
+fn enlarged(svg: &str, factor: f64) -> String {
+    let Some((_, rest)) = svg.split_once("viewBox=\"0 0 ") else { return svg.to_string() };
+    let Some((size, _)) = rest.split_once('"') else { return svg.to_string() };
+    let Some((width, height)) = size.split_once(' ') else { return svg.to_string() };
+    let own = format!("width=\"{width}\" height=\"{height}\"");
+    let larger = |px: &str| px.parse::<f64>().map_or(0.0, |px| (px * factor).round());
+    let shown = format!("width=\"{}\" height=\"{}\"", larger(width), larger(height));
+    svg.replacen(&own, &shown, 1)
 }
 
 #[cfg(test)]
@@ -116,15 +180,20 @@ mod tests {
         document.figures([figure]);
         let words = [("hits", "Number of hits"), ("calm", "Calm sea"), ("missing", "x")];
         let labels = words.map(|(from, to)| (from.into(), to.into())).to_vec();
-        let print = PrintStyle { size_mm: [127.0, 63.5], font_pt: 9.0, labels };
-        let files = print.figures(&document).unwrap();
-        let svg = &files[0].svg;
+        let look = FigureLook::Paper;
+        let print = PrintStyle { look, size_mm: [127.0, 63.5], font_pt: 9.0, labels };
+        let printed = print.figures(&document).unwrap();
+        let svg = &printed[0].file.svg;
         assert!(svg.contains(r#"width="480""#) && svg.contains("Number of hits"), "{svg}");
         assert!(svg.contains("Calm sea") && svg.contains("gap (m)") && !svg.contains(">hits<"));
         assert!(!svg.contains("The title") && !svg.contains("The note"));
         assert_eq!(
-            (files[0].stem.as_str(), print.unused_labels(&document)),
+            (printed[0].file.stem.as_str(), print.unused_labels(&document)),
             ("01-the-title", vec!["missing"])
         );
+        assert!(printed[0].csv.starts_with("series,gap (m),Number of hits,low"));
+        let dark = PrintStyle { look: FigureLook::Dark, ..print };
+        let svg = &dark.figures(&document).unwrap()[0].file.svg;
+        assert!(svg.contains(r#"width="481""#) && !svg.contains("#FFFFFF"), "{svg}");
     }
 }

@@ -3,7 +3,7 @@
 use super::*;
 use sidestep_document::claim::{Claim, Verdict, verdict_summary};
 use sidestep_document::document::{Picture, Text};
-use sidestep_document::figure::{Point, Scale};
+use sidestep_document::figure::{Point, Scale, SlotStats};
 use sidestep_document::{Figure, FigureKind, Series, Table};
 
 /// Text with the markup of each language.
@@ -46,7 +46,17 @@ fn all_figure_kinds() -> Vec<Figure> {
         FigureKind::Bands,
         FigureKind::Points,
         FigureKind::Ways,
-        FigureKind::Bars { categories },
+        FigureKind::Bars { categories: categories.clone() },
+        FigureKind::Dots { categories: categories.clone() },
+        FigureKind::Steps,
+        FigureKind::Forest { rows: categories.clone(), texts: vec![categories.clone()] },
+        FigureKind::Runs {
+            slots: vec![SlotStats { mean: Some(2.0), ..SlotStats::default() }],
+            is_joined: false,
+            has_zero_line: false,
+        },
+        FigureKind::Heat { columns: categories, value_label: HOSTILE.into() },
+        FigureKind::Front { corners: vec![(0.0, 1.0), (1.0, 1.0)] },
     ];
     let point =
         |x: f64, y: f64| Point::new(x, y).with_interval(Some((0.5 * y, 2.0 * y))).with_runs(4);
@@ -77,16 +87,26 @@ fn the_same_document_gives_the_same_bytes() {
 #[test]
 fn every_figure_and_picture_is_a_file_and_is_shown_by_both() {
     let RenderedReport { html, markdown, pictures } = render(&full_document(), "figures").unwrap();
-    assert_eq!(pictures.len(), 6);
+    assert_eq!(pictures.len(), 12);
     assert_eq!(pictures[0].stem, "01-a-figure");
     for picture in &pictures {
         assert!(picture.svg.contains("<svg"), "{}", picture.stem);
         assert!(markdown.contains(&format!("(figures/{}.svg)", picture.stem)), "{markdown}");
     }
     let own = before_scripts(&html);
-    assert_eq!(own.matches("data:image/svg+xml").count(), 6);
-    assert_eq!(own.matches("<figure class=\"plot\"").count(), 5);
-    assert_eq!(own.matches("application/json").count(), 5);
+    assert_eq!(own.matches("data:image/svg+xml").count(), 1);
+    assert_eq!(own.matches("<figure class=\"plot").count(), 11);
+    assert_eq!(own.matches("<svg class=\"chart\" aria-label=").count(), 11);
+    assert_eq!(own.matches("application/json").count(), 11);
+}
+
+#[test]
+fn a_folded_figure_shows_its_title_alone() {
+    let mut document = Document::new("T", "");
+    document.figures(all_figure_kinds().into_iter().map(Figure::folded));
+    let html = render(&document, "figures").unwrap().html;
+    assert_eq!(html.matches("<details class=\"chart-fold\"><summary>A figure</summary>").count(), 11);
+    assert!(!html.contains("<figcaption>"));
 }
 
 #[test]
@@ -94,8 +114,8 @@ fn words_stay_words_in_html() {
     let html = render(&full_document(), "figures").unwrap().html;
     let own = before_scripts(&html);
     assert!(!own.contains("<img src=x") && !own.contains("</script><img"));
-    // Of scripts: one for each figure, the figures' and the page's own.
-    assert_eq!(html.matches("</script>").count(), 5 + 2);
+    // Of scripts: the data of each figure, that of their marks and the page's own.
+    assert_eq!(html.matches("</script>").count(), 11 + 2);
     assert!(own.contains("&lt;/script&gt;&lt;img src=x onerror=alert(1)&gt;"));
     assert!(own.contains("<strong>Mind</strong> the <code>gap</code>"));
 }
@@ -188,7 +208,7 @@ fn bounds_stand_among_the_numbers_and_words_do_not() {
 fn a_report_without_figures_carries_no_script_for_them() {
     let rendered = render(&Document::new("T", "Nothing more."), "figures").unwrap();
     assert!(rendered.html.len() < 20_000, "{}", rendered.html.len());
-    assert!(!rendered.html.contains("figure.plot\""));
+    assert!(!rendered.html.contains("pointermove"));
     assert_eq!(rendered.markdown, "# T\n\nNothing more.\n");
     assert!(rendered.pictures.is_empty());
 }

@@ -10,9 +10,10 @@ use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep_document::Document;
 use sidestep_record::FileSet;
-use sidestep_report::{PrintStyle, SvgFile};
+use sidestep_draw::{DrawError, Fonts, to_pdf, to_png_with_density};
+use sidestep_report::{FigureLook, PrintFigure, PrintStyle};
+use sidestep_session::display_path;
 use sidestep_session::report::document;
-use sidestep_session::{display_path, png_bytes};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -20,7 +21,7 @@ Examples:
   sidestep report runs/office           runs/office/report.html and report.md
   sidestep report runs/office --out office.html
   sidestep report sweeps/methods        intervals, comparisons, figures
-  sidestep report sweeps/methods --figure svg,png --figure-size 85x60
+  sidestep report sweeps/methods --figure pdf --figure-data
 
 The page is one file that needs no network. A run that is not complete can be reported too; its \
 report says so.
@@ -49,31 +50,69 @@ pub(crate) struct ReportArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Figures for print")]
 struct PrintArgs {
-    /// Also write every figure to a file of its own, without title, in these formats: svg, png
+    /// Also write every figure to files of its own, without title: pdf, svg, png
     #[arg(long = "figure", value_name = "FORM,...", value_delimiter = ',')]
     forms: Vec<FigureFormat>,
 
-    /// Width and height of these figures in mm
-    #[arg(long, value_name = "WxH", default_value = "85x60", requires = "forms")]
-    figure_size: String,
+    /// Where they are shown: on paper, in a talk, or on a dark slide
+    #[arg(long, value_name = "STYLE", default_value = "paper", requires = "forms")]
+    figure_style: FigureStyle,
 
-    /// Size of their text in points
-    #[arg(long, value_name = "PT", default_value_t = 8.0, requires = "forms")]
-    figure_font: f64,
+    /// Width and height in mm [default: 85x60, of slides 240x135]
+    #[arg(long, value_name = "WxH", requires = "forms")]
+    figure_size: Option<String>,
 
-    /// Rename the label of an axis or a series in these figures; repeatable
+    /// Size of text in points [default: 8, of slides 16]
+    #[arg(long, value_name = "PT", requires = "forms")]
+    figure_font: Option<f64>,
+
+    /// File of the font of their text, .ttf or .otf [default: DejaVu Sans]
+    #[arg(long, value_name = "FILE", requires = "forms")]
+    figure_family: Option<PathBuf>,
+
+    /// Pixels per inch of PNG
+    #[arg(long, value_name = "DPI", default_value_t = 300.0, requires = "forms")]
+    figure_dpi: f64,
+
+    /// Also write the data of every figure, as CSV beside it
+    #[arg(long, requires = "forms")]
+    figure_data: bool,
+
+    /// Rename a label of an axis or a series in these figures; repeatable
     #[arg(long = "label", value_name = "WORDS=OTHERS", requires = "forms")]
     labels: Vec<String>,
 }
 
-/// Formats of figures for print; PDF is known so that its error can give a remedy.
+/// Formats of figures for print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum FigureFormat {
+    Pdf,
     Svg,
     Png,
-    /// Refused, with the name of a program that converts SVG to it.
-    #[value(hide = true)]
-    Pdf,
+}
+
+/// Where figures are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FigureStyle {
+    Paper,
+    Talk,
+    Dark,
+}
+
+impl FigureStyle {
+    fn look(self) -> FigureLook {
+        match self {
+            Self::Paper => FigureLook::Paper,
+            Self::Talk => FigureLook::Talk,
+            Self::Dark => FigureLook::Dark,
+        }
+    }
+}
+
+/// Figures for print: their look, and the fonts of PNG and PDF.
+struct Print {
+    style: PrintStyle,
+    fonts: Fonts,
 }
 
 /// # Errors
@@ -85,7 +124,7 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
     let figures = args.print.figures()?;
     files.begin()?;
     let document = document(worlds(), &args.folder, &ConsoleWatcher::new(console))?;
-    figures.iter().try_for_each(|print| check_labels(print, &document))?;
+    figures.iter().try_for_each(|print| check_labels(&print.style, &document))?;
     let mut listed = files.begin()?;
     let figures =
         figures.map(|print| args.print.add(&print, &document, &files, &mut listed)).transpose()?;
@@ -108,23 +147,41 @@ impl PrintArgs {
     /// Returns how figures for print look; `None` if none are requested.
     ///
     /// # Errors
-    /// When a size, a label or a format is wrong.
-    fn figures(&self) -> Result<Option<PrintStyle>, InputError> {
-        if self.forms.contains(&FigureFormat::Pdf) {
-            let remedy = "write svg, of which `rsvg-convert -f pdf` or Inkscape make PDF";
-            return Err(InputError::new("--figure", "no figure is written as PDF", remedy));
-        }
+    /// When a size, a label or a font is wrong.
+    fn figures(&self) -> Result<Option<Print>, InputError> {
         if self.forms.is_empty() {
             return Ok(None);
         }
-        if !(4.0..=40.0).contains(&self.figure_font) {
-            let cause = format!("is {} pt", self.figure_font);
+        let look = self.figure_style.look();
+        let font_pt = self.figure_font.unwrap_or(look.font_pt());
+        if !(4.0..=40.0).contains(&font_pt) {
+            let cause = format!("is {font_pt} pt");
             return Err(InputError::new("--figure-font", cause, "give 4 to 40"));
+        }
+        if !(30.0..=1200.0).contains(&self.figure_dpi) {
+            let cause = format!("is {}", self.figure_dpi);
+            return Err(InputError::new("--figure-dpi", cause, "give 30 to 1200"));
         }
         let labels =
             self.labels.iter().map(|label| parse_label(label)).collect::<Result<_, _>>()?;
-        let size_mm = parse_size_mm(&self.figure_size)?;
-        Ok(Some(PrintStyle { size_mm, font_pt: self.figure_font, labels }))
+        let size_mm = match &self.figure_size {
+            Some(size) => parse_size_mm(size)?,
+            None => look.size_mm(),
+        };
+        let style = PrintStyle { look, size_mm, font_pt, labels };
+        Ok(Some(Print { style, fonts: self.fonts()? }))
+    }
+
+    /// Returns the fonts of the figures.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or is no font.
+    fn fonts(&self) -> Result<Fonts, InputError> {
+        let Some(file) = &self.figure_family else { return Ok(Fonts::default()) };
+        let remedy = "give a font file: fc-list shows those of this machine";
+        let wrong = |cause: String| InputError::new(file.display(), cause, remedy);
+        let bytes = std::fs::read(file).map_err(|error| wrong(error.to_string()))?;
+        Fonts::from_file_bytes(bytes).map_err(|error| wrong(error.to_string()))
     }
 
     /// Adds the figures beside the page, and returns their folder.
@@ -133,33 +190,62 @@ impl PrintArgs {
     /// When something cannot be drawn or written.
     fn add(
         &self,
-        print: &PrintStyle,
+        print: &Print,
         document: &Document,
         files: &ReportFiles,
         listed: &mut FileSet,
     ) -> Result<PathBuf, Failure> {
         let folder = format!("{}-print", files.stem());
-        for SvgFile { stem, svg } in print.figures(document)? {
-            if self.forms.contains(&FigureFormat::Svg) {
-                listed.stage_bytes::<Failure>(&format!("{folder}/{stem}.svg"), svg.as_bytes())?;
-            }
-            if self.forms.contains(&FigureFormat::Png) {
-                listed
-                    .stage_bytes::<Failure>(&format!("{folder}/{stem}.png"), &png_bytes(&svg)?)?;
+        for figure in print.style.figures(document)? {
+            let place = format!("{folder}/{}", figure.file.stem);
+            for (ending, bytes) in self.figure_files(print, &figure)? {
+                listed.stage_bytes::<Failure>(&format!("{place}.{ending}"), &bytes)?;
             }
         }
         Ok(files.html.with_file_name(folder))
+    }
+
+    /// Returns a figure in all requested formats, with the ending of each.
+    ///
+    /// # Errors
+    /// When it cannot be drawn.
+    fn figure_files(
+        &self,
+        print: &Print,
+        figure: &PrintFigure,
+    ) -> Result<Vec<(&'static str, Vec<u8>)>, DrawError> {
+        let svg = print.fonts.apply(&figure.file.svg);
+        let mut files = Vec::new();
+        if self.forms.contains(&FigureFormat::Pdf) {
+            files.push(("pdf", to_pdf(&svg, &figure.title, &print.fonts)?));
+        }
+        if self.forms.contains(&FigureFormat::Png) {
+            files.push(("png", to_png_with_density(&svg, self.figure_dpi, &print.fonts)?));
+        }
+        if self.forms.contains(&FigureFormat::Svg) {
+            files.push(("svg", svg.into_bytes()));
+        }
+        if self.figure_data {
+            files.push(("csv", figure.csv.clone().into_bytes()));
+        }
+        Ok(files)
     }
 }
 
 /// Checks that each label occurs in some figure, before anything is written.
 ///
 /// # Errors
-/// When one is in none; the error names the first.
+/// When one is in none; the error names the first, and the labels that there are.
 fn check_labels(print: &PrintStyle, document: &Document) -> Result<(), InputError> {
     let Some(label) = print.unused_labels(document).first().copied() else { return Ok(()) };
     let cause = format!("no figure has the words `{label}`");
-    Err(InputError::new("--label", cause, "write them as the figure's axis or legend does"))
+    let known: Vec<String> =
+        PrintStyle::document_labels(document).iter().map(|known| format!("`{known}`")).collect();
+    let remedy = match &known[..] {
+        [] => "leave it out: there is no figure".to_string(),
+        known => format!("write one of {}", known.join(", ")),
+    };
+    Err(InputError::new("--label", cause, remedy))
 }
 
 /// Parses width and height in mm.

@@ -28,22 +28,13 @@
     }
   }
 
-  async function press(element) {
-    const box = element.getBoundingClientRect();
-    send(element, [box.x + 2, box.y + 2], "pointermove", "pointerdown", "pointerup", "click");
-    await later(100);
-  }
-
-  // The place in the window of the first mark of a figure.
+  // The place in the window of the first mark of a figure that the pointer finds.
   function firstMark(plot) {
-    const mark = plot.querySelector(".series .marker, .series .bar, .series .line");
-    if (!mark) return null;
-    const box = mark.getBoundingClientRect();
-    if (mark.matches(".bar")) return [box.x + box.width / 2, box.y + 1];
-    if (mark.matches(".marker")) return [box.x + box.width / 2, box.y + box.height / 2];
-    const chart = plot.querySelector(".chart").getBoundingClientRect();
-    const start = mark.getPointAtLength(0);
-    return [chart.x + start.x, chart.y + start.y];
+    const { spots } = JSON.parse(plot.querySelector('script[type="application/json"]').text);
+    const svg = plot.querySelector(".chart");
+    const box = svg.getBoundingClientRect();
+    const scale = box.width / svg.viewBox.baseVal.width;
+    return spots.length === 0 ? null : [box.x + spots[0][0] * scale, box.y + spots[0][1] * scale];
   }
 
   // What a figure says when the mouse is at its first mark.
@@ -53,39 +44,21 @@
     return plot.querySelector(".tip:not([hidden])")?.textContent ?? "";
   }
 
-  const ticks = (plot) =>
-    [...plot.querySelectorAll(".tick")].map((tick) => tick.textContent).join(" ");
-
-  // Words at the axes of a figure that touch others or are cut off by its edge.
+  // Words of a figure that touch others or are cut off by its edge.
   function spoiled(plot) {
     const edge = plot.querySelector(".chart").getBoundingClientRect();
-    const words = [...plot.querySelectorAll(".tick")].map((tick) => [
-      tick.textContent,
-      tick.getBoundingClientRect(),
+    const words = [...plot.querySelectorAll(".chart text")].map((text) => [
+      text.textContent,
+      text.getBoundingClientRect(),
     ]);
     const isCut = ([, box]) =>
       box.left < edge.left - 1 || box.right > edge.right + 1 || box.bottom > edge.bottom + 1;
     const touch = ([, a], [, b]) =>
       Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 &&
-      Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2;
+      Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 4;
     return words
       .filter((word, k) => isCut(word) || words.slice(k + 1).some((other) => touch(word, other)))
       .map(([word]) => word);
-  }
-
-  // Drags across the middle of a figure, and says what came of it and of a double click.
-  function zoom(plot) {
-    const chart = plot.querySelector(".chart");
-    const box = chart.getBoundingClientRect();
-    const at = (part) => [box.x + part * box.width, box.y + part * box.height];
-    const whole = ticks(plot);
-    send(chart, at(0.4), "pointermove", "pointerdown");
-    send(chart, at(0.5), "pointermove");
-    const isMarked = plot.querySelector(".selection").getAttribute("visibility") === "visible";
-    send(chart, at(0.6), "pointermove", "pointerup", "click");
-    const isZoomed = isMarked && ticks(plot) !== whole;
-    send(chart, at(0.5), "dblclick");
-    return [isZoomed, ticks(plot) === whole];
   }
 
   // Parts of the page that reach beyond its right side, but those inside what scrolls on its own.
@@ -115,7 +88,9 @@
   }
 
   async function look() {
-    const plots = all(".plot .drawn");
+    // Folded ones have no size before they are opened.
+    all(".chart-fold").forEach((details) => (details.open = true));
+    const plots = all(".plot");
     for (
       let k = 0;
       k < 300 && all(".plot").length !== Number(document.documentElement.dataset.drawn ?? 0);
@@ -124,9 +99,7 @@
       await later(100);
     }
     found.figures = all("figure.plot").length;
-    found.drawn = plots.filter((plot) => plot.querySelector(".chart .frame")).length;
-    found.stills_shown = all(".plot .still").filter((still) => !still.hidden).length;
-    found.series = plots.map((plot) => plot.querySelectorAll(".series").length);
+    found.drawn = plots.filter((plot) => plot.querySelector(".chart")?.getBoundingClientRect().height > 50).length;
     found.spoiled = plots.flatMap(spoiled);
     found.silent = plots.filter((plot) => firstMark(plot) && hover(plot) === "").length;
     found.pictures = all(".picture img").map((picture) => picture.naturalWidth);
@@ -170,19 +143,8 @@
         found.sorted.push(column());
       }
     }
-    const plot = plots.find(
-      (each) => each.querySelectorAll(".series").length > 1 && each.querySelector(".entry"),
-    );
-    if (plot) {
-      found.hover = hover(plot);
-      [found.zoomed, found.whole_again] = zoom(plot);
-      const count = () => plot.querySelectorAll(".series").length;
-      const before = count();
-      await press(plot.querySelector(".entry"));
-      found.hidden_by_legend = before - count();
-      await press(plot.querySelector(".entry"));
-      found.shown_again = count() === before;
-    }
+    all(".chart-fold").forEach((details) => (details.open = true));
+    found.hover = plots.map(hover);
     // A page of its own makes none.
     found.requests = performance
       .getEntriesByType("resource")

@@ -103,8 +103,17 @@ fn figures_for_print_have_a_size_and_words_of_their_own_and_no_title() {
         assert_eq!(ended.code(), 2, "{option} {value}");
         assert!(ended.err().contains(says), "{}", ended.err());
     }
-    let ended = place.run(&["report", "r", "--figure", "pdf"]);
-    assert_eq!((ended.code(), ended.err().contains("write svg")), (2, true), "{}", ended.err());
+    let ended = place.run(&["report", "r", "--figure", "svg", "--label", "none such=x"]);
+    assert!(ended.err().contains("write one of `"), "{}", ended.err());
+    let ended = place.run(&["report", "r", "--figure", "svg", "--figure-family", "none.ttf"]);
+    assert!(ended.err().contains("give a font file"), "{}", ended.err());
+    place.json(&["report", "r", "--figure", "pdf", "--figure-style", "dark", "--figure-data"]);
+    let files = names(&place.path("r/report-print"));
+    let with_ending = |ending: &str| files.iter().filter(|name| name.ends_with(ending)).count();
+    assert_eq!((with_ending(".pdf"), with_ending(".csv")), (files.len() / 2, files.len() / 2));
+    let pdf = files.iter().find(|name| name.ends_with(".pdf")).expect("a figure");
+    let bytes = std::fs::read(place.path(&format!("r/report-print/{pdf}"))).expect("read");
+    assert!(bytes.starts_with(b"%PDF-"));
 }
 
 #[test]

@@ -18,6 +18,8 @@ const MARK_FRACTION: f64 = 0.42;
 /// An end of an interval farther from zero than this multiple of the third quartile of all ends is cut off, with an
 /// arrow: one large effect would press all others against zero.
 const MAX_SPREAD: f64 = 3.0;
+/// Reach of the axis beyond the largest effects.
+const MARGIN: f64 = 1.04;
 /// Largest fraction of the width for the text beside the effects; without that room it is left out.
 const MAX_TEXT_FRACTION: f64 = 0.4;
 
@@ -26,7 +28,7 @@ const MAX_TEXT_FRACTION: f64 = 0.4;
 pub struct ForestMark {
     /// The effect in units of the axis; one that is not a number has only its text.
     pub value: f64,
-    /// Lower and upper end of its interval. The mark of an effect whose interval has zero in it is hollow.
+    /// Lower and upper end of its interval, if it has one. Where that has zero in it, the mark is hollow.
     pub interval: Option<(f64, f64)>,
     /// The effect in words, which stand on the right.
     pub text: String,
@@ -92,7 +94,8 @@ impl ForestChart {
             DrawError::length("effects of a series", self.rows.len(), series.marks.len())?;
         }
         let limit = self.limit();
-        let shown = self.ends().map(|end| end.clamp(-limit, limit));
+        // A little more, so that no mark sits on the frame.
+        let shown = self.ends().map(|end| MARGIN * end.clamp(-limit, limit));
         let beside_px = self.beside_px(style);
         // The axis has less room than that of other charts.
         let across = max_ticks(&Style { width_px: 0.55 * style.width_px, ..*style }).0;
@@ -231,7 +234,7 @@ impl MarkPlace {
         if at < left - 0.5 || at > right + 0.5 {
             return;
         }
-        let has_zero = interval.is_none_or(|(low, high)| low <= 0.0 && high >= 0.0);
+        let has_zero = interval.is_some_and(|(low, high)| low <= 0.0 && high >= 0.0);
         marker.draw(&mut frame.svg, (at, self.y), self.radius, color);
         if has_zero {
             // The same marker, smaller and in the color of the ground, leaves a rim.

@@ -15,10 +15,8 @@ const BOX_FRACTION: f64 = 0.36;
 const SWARM_FRACTION: f64 = 0.56;
 /// Largest width of a box.
 const MAX_BOX_PX: f64 = 64.0;
-/// Distance of a mean from the middle of its slot, as a fraction of the slot.
-const MEAN_FRACTION: f64 = 0.34;
-/// Longest distance of a mean from the middle of its slot, beyond the marks of runs.
-const MAX_MEAN_PX: f64 = 48.0;
+/// Largest distance of a mean from the middle of its slot, as a fraction of the slot: beyond it the next one begins.
+const MAX_MEAN_FRACTION: f64 = 0.42;
 
 /// The quartiles of a slot, and how far its values reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -201,7 +199,8 @@ impl SlotChart {
             frame.push_spot(at, index, *run);
         }
         if let Some((mean, interval)) = slot.mean.filter(|(mean, _)| self.y.contains(*mean)) {
-            let widest = asides.iter().fold(0.0_f64, |widest, aside| widest.max(aside.abs()));
+            let box_px = if slot.quartiles.is_some() { place.box_width() / 2.0 } else { 0.0 };
+            let widest = asides.iter().fold(box_px, |widest, aside| widest.max(aside.abs()));
             // The first of several joined slots has its mean on the left, where no line is.
             let side = if self.is_joined && index == 0 && self.slots.len() > 1 { -1.0 } else { 1.0 };
             let x = place.center + side * place.mean_aside(widest);
@@ -225,12 +224,15 @@ impl SlotPlace {
 
     /// Returns how far from the middle of the slot the mean is: beyond the marks of runs.
     fn mean_aside(&self, widest_px: f64) -> f64 {
-        let beyond = (widest_px + 5.0 * self.radius).min(MAX_MEAN_PX.max(widest_px));
-        beyond.min(MEAN_FRACTION.max(SWARM_FRACTION / 2.0 + 0.1) * self.width)
+        (widest_px + 4.5 * self.radius).min(MAX_MEAN_FRACTION * self.width)
+    }
+
+    fn box_width(&self) -> f64 {
+        (BOX_FRACTION * self.width).min(MAX_BOX_PX)
     }
 
     fn draw_box(&self, frame: &mut ChartFrame, quartiles: &QuartileBox, color: &str) {
-        let width = (BOX_FRACTION * self.width).min(MAX_BOX_PX);
+        let width = self.box_width();
         let [first, median, third] = quartiles.quartiles.map(|value| frame.y.px(value));
         let [low, high] = quartiles.whiskers.map(|value| frame.y.px(value));
         let left = self.center - width / 2.0;

@@ -5,7 +5,7 @@ use super::groups::RunGroups;
 use super::label::capitalized;
 use super::run_charts::{VariantNames, baseline_name};
 use super::summary::{MetricSummary, MetricValues};
-use super::text::{difference, format_p_value};
+use super::text::difference;
 use sidestep_document::figure::Point;
 use sidestep_document::{Figure, FigureKind, Series};
 
@@ -101,11 +101,18 @@ fn variants_forest(
 /// Returns a difference in the unit of its metric, with its p.
 fn difference_text(comparison: &Comparison) -> String {
     let sign = if comparison.difference.is_some_and(|d| d > 0.0) { "+" } else { "" };
-    let text = format!("{sign}{}", difference(comparison)).replace('-', "\u{2212}");
-    match comparison.p_holm {
-        Some(p) if p < 0.0001 => format!("{text}, p {}", format_p_value(p)),
-        Some(p) => format!("{text}, p = {}", format_p_value(p)),
-        None => text,
+    let text = format!("{sign}{}", difference(comparison)).replace(" [-]", "");
+    let text = text.replace('-', "\u{2212}");
+    comparison.p_holm.map_or(text.clone(), |p| format!("{text}, {}", p_text(p)))
+}
+
+/// Returns a p-value with as many digits as a paper gives.
+fn p_text(p: f64) -> String {
+    match p {
+        p if p < 0.0001 => "p < 0.0001".into(),
+        p if p < 0.01 => format!("p = {p:.4}"),
+        p if p < 0.1 => format!("p = {p:.3}"),
+        p => format!("p = {p:.2}"),
     }
 }
 

@@ -299,6 +299,30 @@ fn figures_are_lines_over_numbers_dots_over_words_and_points_where_nothing_is_on
     assert!(lag.rank_correlation.unwrap().value > 0.99 && lag.n == 30);
 }
 
+#[test]
+fn the_first_page_has_the_comparison_against_zero_and_at_most_six_figures() {
+    let summary = against_the_calmest(&grid());
+    let lead = summary.lead_figures();
+    assert!((2..=6).contains(&lead.len()), "{} figures", lead.len());
+    let FigureKind::Forest { rows, texts } = &lead[0].kind else { panic!("a forest first") };
+    let compared = lead[0].series.len();
+    assert!(texts.len() == compared && texts.iter().all(|texts| texts.len() == rows.len()));
+    assert!(lead[0].x_label.starts_with("difference from "), "{}", lead[0].x_label);
+    assert!(lead[1..].iter().any(|figure| figure.kind == FigureKind::Lines));
+}
+
+#[test]
+fn two_variants_are_shown_seed_by_seed() {
+    let values = (0..24).map(|k| f64::from(k % 12) + 0.1 * f64::from(k * k % 7) + f64::from(k / 12));
+    let metrics = vec![column("lag_m", Role::Metric, numbers(values))];
+    let summary = summed(&two_variants(12, metrics));
+    let kinds: Vec<&FigureKind> = summary.lead_figures().iter().map(|f| &f.kind).collect();
+    assert!(matches!(kinds[0], FigureKind::Forest { .. }));
+    assert!(matches!(kinds[1], FigureKind::Runs { is_joined: true, .. }));
+    assert!(matches!(kinds[2], FigureKind::Runs { has_zero_line: true, .. }));
+    assert!(kinds.contains(&&FigureKind::Steps));
+}
+
 /// A hypercube of which one side is a whole number: some variants share it, and still none is a baseline.
 #[test]
 fn samples_of_whole_numbers_are_samples_too() {

@@ -428,7 +428,7 @@ fn format_number(value: f64, half_width: Option<f64>) -> String {
     if text.trim_matches(['-', '0', '.']).is_empty() { text.replace('-', "") } else { text }
 }
 
-pub(super) fn format_p_value(p: f64) -> String {
+fn format_p_value(p: f64) -> String {
     if p < 0.0001 { "< 0.0001".into() } else { format!("{p:.4}") }
 }
 

@@ -1,7 +1,7 @@
 //! Figures, whose marks tell their values, and pictures.
 
 use super::tables;
-use crate::SvgFile;
+use crate::PagePicture;
 use maud::{Markup, PreEscaped, html};
 use serde_json::json;
 use sidestep_document::document::Picture;
@@ -12,8 +12,8 @@ use sidestep_draw::{DARK_COLORS, Spot};
 /// the page as JSON anyway.
 const MAX_TABLE_ROWS: usize = 200;
 
-pub(super) fn figure(figure: &Figure, id: &str, still: Option<&SvgFile>) -> Markup {
-    let chart = html! { @if let Some(still) = still { (chart(figure, still)) } };
+pub(super) fn figure(figure: &Figure, id: &str, drawn: Option<&PagePicture>) -> Markup {
+    let chart = html! { @if let Some(drawn) = drawn { (chart(figure, drawn)) } };
     let class = if has_full_width(figure) { "plot full" } else { "plot" };
     html! {
         figure class=(class) id=(id) {
@@ -33,11 +33,11 @@ fn has_full_width(figure: &Figure) -> bool {
 }
 
 /// Returns the drawing of a figure, what its marks say where the pointer is, and its numbers.
-fn chart(figure: &Figure, still: &SvgFile) -> Markup {
-    let spots: Vec<_> = still.spots.iter().map(spot_json).collect();
+fn chart(figure: &Figure, drawn: &PagePicture) -> Markup {
+    let spots: Vec<_> = drawn.spots.iter().map(spot_json).collect();
     let data = json!({ "figure": figure, "spots": spots });
     html! {
-        div .canvas { (inline_svg(&still.svg, &alt_text(figure))) }
+        div .canvas { (inline_svg(&drawn.file.svg, &alt_text(figure))) }
         script type="application/json" { (PreEscaped(safe_json(&data))) }
         @if !figure.note.is_empty() { p .note { (figure.note) } }
         @if let Some(numbers) = numbers_table(figure) {

@@ -10,7 +10,7 @@ mod blocks;
 mod figures;
 mod tables;
 
-use crate::{SvgFile, slug};
+use crate::{PagePicture, slug};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use sidestep_document::Document;
 use sidestep_document::document::{Block, Span, Text};
@@ -31,7 +31,7 @@ const HINT: &str = "Figures: point at a mark for its values.";
 const MIN_CONTENTS_SECTIONS: usize = 3;
 
 /// Returns the page; `pictures` has one for each figure and picture, in order.
-pub(crate) fn page(document: &Document, pictures: &[SvgFile]) -> String {
+pub(crate) fn page(document: &Document, pictures: &[PagePicture]) -> String {
     let sections = PageSection::all(document, pictures);
     let has_contents =
         sections.iter().filter(|s| s.title.is_some()).count() >= MIN_CONTENTS_SECTIONS;
@@ -80,12 +80,12 @@ struct PageSection<'a> {
 struct PageBlock<'a> {
     block: &'a Block,
     id: String,
-    picture: Option<&'a SvgFile>,
+    picture: Option<&'a PagePicture>,
 }
 
 impl<'a> PageSection<'a> {
     /// Returns the blocks of a document by section.
-    fn all(document: &'a Document, pictures: &'a [SvgFile]) -> Vec<Self> {
+    fn all(document: &'a Document, pictures: &'a [PagePicture]) -> Vec<Self> {
         let mut sections = vec![Self { title: None, id: String::new(), blocks: Vec::new() }];
         let mut pictures = pictures.iter();
         for (k, block) in document.blocks.iter().enumerate() {
