@@ -280,7 +280,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_data_of_a_figure_have_the_names_of_its_positions_and_empty_cells_for_what_is_not_there() {
+    fn the_data_of_a_figure_have_the_names_of_its_positions_and_empty_cells_for_what_is_not_there()
+    {
         let points = vec![
             Point::new(0.0, 1.5).with_interval(Some((1.0, 2.0))).with_runs(4),
             Point::new(1.0, f64::NAN),

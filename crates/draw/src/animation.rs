@@ -10,8 +10,8 @@ use crate::error::DrawError;
 use crate::picture::canvas::{Camera, Canvas};
 use crate::picture::{Scene, animation_bounds, check_content, projected_bounds};
 use crate::raster::parse;
-use crate::text::Fonts;
 use crate::svg::{Anchor, Rect, Svg, TextStyle};
+use crate::text::Fonts;
 
 /// Shortest side of a picture, pixels: below it a long and narrow world would leave nothing to see.
 const MIN_FRAME_PX: u32 = 32;

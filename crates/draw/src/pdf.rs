@@ -34,7 +34,12 @@ pub fn to_pdf(svg: &str, title: &str, fonts: &Fonts) -> Result<Vec<u8>, DrawErro
 }
 
 /// Returns the whole file: the page, its content, and what that refers to.
-fn file(stream: &[u8], (width, height): (f32, f32), opacities: &[Opacities], title: &str) -> Vec<u8> {
+fn file(
+    stream: &[u8],
+    (width, height): (f32, f32),
+    opacities: &[Opacities],
+    title: &str,
+) -> Vec<u8> {
     let [catalog, pages, page_id, content_id, info] = [1, 2, 3, 4, 5].map(Ref::new);
     let state_id = |k: usize| Ref::new(6 + k as i32);
     let mut pdf = Pdf::new();

@@ -22,7 +22,8 @@ pub fn to_dark(svg: &str) -> String {
     let mut dark = svg.to_string();
     for (light, other) in DARK_COLORS {
         for attribute in ["fill", "stroke"] {
-            dark = dark.replace(&format!("{attribute}=\"{light}\""), &format!("{attribute}=\"{other}\""));
+            dark = dark
+                .replace(&format!("{attribute}=\"{light}\""), &format!("{attribute}=\"{other}\""));
         }
     }
     dark

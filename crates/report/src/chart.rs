@@ -59,9 +59,7 @@ pub(crate) fn draw_chart(figure: &Figure, style: &Style) -> Result<DrawnChart, D
             }
             chart.x_label(&figure.x_label).note(&figure.note).draw(style)
         }
-        FigureKind::Heat { columns, value_label } => {
-            heat(figure, columns, value_label).draw(style)
-        }
+        FigureKind::Heat { columns, value_label } => heat(figure, columns, value_label).draw(style),
     }
 }
 

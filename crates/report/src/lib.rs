@@ -47,11 +47,7 @@ pub fn render(document: &Document, folder: &str) -> Result<RenderedReport, DrawE
     let pictures = pictures(document)?;
     let html = html::page(document, &pictures);
     let pictures: Vec<SvgFile> = pictures.into_iter().map(|picture| picture.file).collect();
-    Ok(RenderedReport {
-        html,
-        markdown: markdown::text(document, folder, &pictures),
-        pictures,
-    })
+    Ok(RenderedReport { html, markdown: markdown::text(document, folder, &pictures), pictures })
 }
 
 /// Returns all figures and pictures, numbered in order.

@@ -105,7 +105,10 @@ fn a_folded_figure_shows_its_title_alone() {
     let mut document = Document::new("T", "");
     document.figures(all_figure_kinds().into_iter().map(Figure::folded));
     let html = render(&document, "figures").unwrap().html;
-    assert_eq!(html.matches("<details class=\"chart-fold\"><summary>A figure</summary>").count(), 11);
+    assert_eq!(
+        html.matches("<details class=\"chart-fold\"><summary>A figure</summary>").count(),
+        11
+    );
     assert!(!html.contains("<figcaption>"));
 }
 

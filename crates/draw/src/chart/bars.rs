@@ -1,8 +1,8 @@
 //! Grouped bars: one group per category, in each group one bar per series.
 
 use crate::axis::Axis;
-use crate::chart::{DrawnChart, error_bar};
 use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks};
+use crate::chart::{DrawnChart, error_bar};
 use crate::error::DrawError;
 use crate::legend::{LegendEntry, LegendSymbol, Marker};
 use crate::style::{INK, Style, series_color, series_fill};

@@ -1,7 +1,7 @@
 //! A forest: effects with their intervals, one below the other, against zero.
 
 use crate::axis::{Axis, Scale};
-use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks};
+use crate::chart::frame::{ChartFrame, FrameText, MAX_TICK_LABEL_FRACTION, XAxis, max_ticks};
 use crate::chart::{DrawnChart, level_error_bar};
 use crate::error::DrawError;
 use crate::legend::{LegendEntry, LegendSymbol, Marker};
@@ -20,8 +20,8 @@ const MARK_FRACTION: f64 = 0.42;
 const MAX_SPREAD: f64 = 3.0;
 /// Reach of the axis beyond the largest effects.
 const MARGIN: f64 = 1.04;
-/// Largest fraction of the width for the text beside the effects; without that room it is left out.
-const MAX_TEXT_FRACTION: f64 = 0.4;
+/// Largest fraction of the width for the names of rows and the text together; without that room the text is left out.
+const MAX_WORDS_FRACTION: f64 = 0.68;
 
 /// An effect in one row.
 #[derive(Debug, Clone, PartialEq)]
@@ -156,9 +156,12 @@ impl ForestChart {
 
     /// Returns the room for the text beside the effects; 0 if it is left out.
     fn beside_px(&self, style: &Style) -> f64 {
-        let width = |mark: &ForestMark| text::width(&mark.text, style.small_px(), Weight::Regular);
-        let widest = self.marks().map(width).fold(0.0, f64::max);
-        let fits = widest > 0.0 && widest <= MAX_TEXT_FRACTION * style.width_px;
+        let width = |text: &String| text::width(text, style.small_px(), Weight::Regular);
+        let widest = self.marks().map(|mark| width(&mark.text)).fold(0.0, f64::max);
+        // Names that are longer are broken.
+        let max_name = MAX_TICK_LABEL_FRACTION * style.width_px;
+        let names = self.rows.iter().map(width).fold(0.0, f64::max).min(max_name);
+        let fits = widest > 0.0 && widest + names <= MAX_WORDS_FRACTION * style.width_px;
         if fits { widest + TEXT_GAP_PX } else { 0.0 }
     }
 
@@ -247,10 +250,47 @@ impl MarkPlace {
         let tip = edge + side * self.radius;
         let back = edge - side * self.radius;
         let (top, bottom) = (self.y - self.radius, self.y + self.radius);
-        let data = crate::chart::frame::polyline(
-            [(tip, self.y), (back, top), (back, bottom)].into_iter(),
-        ) + "Z";
+        let data =
+            crate::chart::frame::polyline([(tip, self.y), (back, top), (back, bottom)].into_iter())
+                + "Z";
         frame.svg.path(&data, format_args!(r#"fill="{color}""#));
     }
 }
 
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(effects: [f64; 4], text: &str) -> ForestChart {
+        let mark = |value: f64| ForestMark {
+            value,
+            interval: Some((value - 1.0, value + 1.0)),
+            text: text.into(),
+        };
+        let series = ForestSeries { label: "b".into(), marks: effects.map(mark).to_vec() };
+        let rows = ["way", "trips", "waits", "hits"];
+        ForestChart::new("T", Axis::linear("difference (%)"), rows).series(series)
+    }
+
+    #[test]
+    fn a_mark_is_hollow_where_its_interval_has_zero_in_it_and_an_arrow_where_it_is_far_away() {
+        let drawn = chart([5.0, 0.5, -6.0, 900.0], "+5.0").draw(&Style::CHART).unwrap();
+        // Three marks, one of them with a hole; the fourth lies beyond the axis.
+        assert_eq!(drawn.svg.matches("<circle").count(), 4);
+        assert_eq!((drawn.spots.len(), drawn.svg.matches(">+5.0</text>").count()), (4, 4));
+        assert!(drawn.svg.contains("Z\" fill=\"#0072B2\""), "{}", drawn.svg);
+    }
+
+    #[test]
+    fn words_beside_the_effects_are_left_out_where_they_have_no_room() {
+        let long = "+5.0 [4.0, 6.0], p = 0.0003";
+        let narrow = Style { width_px: 240.0, ..Style::CHART };
+        let svg = chart([1.0, 2.0, 3.0, 4.0], long).draw(&narrow).unwrap().svg;
+        assert!(!svg.contains(long) && svg.contains("difference"), "{svg}");
+        let short = ForestChart::new("T", Axis::linear(""), ["a"]).series(ForestSeries {
+            label: String::new(),
+            marks: vec![],
+        });
+        assert!(short.draw(&narrow).is_err());
+    }
+}

@@ -22,7 +22,7 @@ const MAX_UPRIGHT_FRACTION: f64 = 0.4;
 const MIN_AREA_FRACTION: f64 = 0.55;
 /// Largest fraction of the picture's width that labels of the vertical axis take; longer ones are broken. Numbers never
 /// are so long, names of metrics are.
-const MAX_TICK_LABEL_FRACTION: f64 = 0.34;
+pub(crate) const MAX_TICK_LABEL_FRACTION: f64 = 0.34;
 
 /// The content of the horizontal axis.
 pub(crate) enum XAxis<'a> {
@@ -91,8 +91,7 @@ impl WrappedLabels {
     fn beside(style: &Style, words: &FrameText<'_>, up: &FittedAxis) -> Self {
         let least_height = MIN_AREA_FRACTION * style.height_px;
         let room = MAX_TICK_LABEL_FRACTION * style.width_px;
-        let wrap_tick =
-            |label: &String| text::wrap(label, style.small_px(), Weight::Regular, room);
+        let wrap_tick = |label: &String| text::wrap(label, style.small_px(), Weight::Regular, room);
         Self {
             title: vec![],
             note: vec![],

@@ -92,7 +92,8 @@ impl HeatChart {
             let symbol = LegendSymbol::Swatch { fill, rim: "none".into(), opacity: 1.0 };
             let value = short_number(low + part * (high - low));
             // The last one has the name, so that the numbers stay together.
-            let label = if k + 1 == count { format!("{value}  {}", self.value_label) } else { value };
+            let label =
+                if k + 1 == count { format!("{value}  {}", self.value_label) } else { value };
             entries.push(LegendEntry::new(symbol, label));
         }
         entries
@@ -100,7 +101,12 @@ impl HeatChart {
 }
 
 /// Fills a cell with the color of its value, and writes that into it where there is room.
-fn draw_cell(frame: &mut ChartFrame, cell: Rect, (value, [low, high]): (f64, [f64; 2]), style: &Style) {
+fn draw_cell(
+    frame: &mut ChartFrame,
+    cell: Rect,
+    (value, [low, high]): (f64, [f64; 2]),
+    style: &Style,
+) {
     let part = if high > low { (value - low) / (high - low) } else { 0.0 };
     let fill = color(part);
     let attributes = format!(r#"fill="{}" stroke="{GROUND}" stroke-width="1""#, hex(fill));
@@ -166,7 +172,9 @@ mod tests {
         };
         let drawn = chart.draw(&Style::CHART).unwrap();
         assert_eq!(drawn.spots.len(), 3);
-        assert!(drawn.svg.contains(r##"fill="#440154""##) && drawn.svg.contains(r##"fill="#FDE725""##));
+        assert!(
+            drawn.svg.contains(r##"fill="#440154""##) && drawn.svg.contains(r##"fill="#FDE725""##)
+        );
         assert!(drawn.svg.contains(">1.23</text>") && drawn.svg.contains("10  hits"));
         let short = HeatChart { values: vec![vec![1.0]; 2], ..chart };
         assert!(short.draw(&Style::CHART).is_err());

@@ -1,8 +1,8 @@
 //! Lines and points over numeric axes.
 
 use crate::axis::{Axis, FittedAxis, Scale};
-use crate::chart::{DrawnChart, error_bar, level_error_bar};
 use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks, polyline};
+use crate::chart::{DrawnChart, error_bar, level_error_bar};
 use crate::error::DrawError;
 use crate::legend::{
     LegendEntry, LegendSymbol, Marker, arrowhead, reference_line_attributes, start_mark,
@@ -275,7 +275,9 @@ impl Plot {
             }
             let at = (x.px(point.x), y.px(point.y));
             frame.push_spot(at, index, number);
-            if let Some((low, high)) = point.x_interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
+            if let Some((low, high)) =
+                point.x_interval.filter(|(l, h)| l.is_finite() && h.is_finite())
+            {
                 let ends = (x.px(low), x.px(high));
                 level_error_bar(&mut frame.svg, at.1, ends, 0.3 * style.font_px, color);
             }
@@ -300,7 +302,9 @@ impl Plot {
         let color = &series_color(index);
         let dash = series_dash(index);
         let y = frame.y;
-        for run in series.points.split(|p| !self.contains(p)).filter(|run| has_line(series.mark, run)) {
+        for run in
+            series.points.split(|p| !self.contains(p)).filter(|run| has_line(series.mark, run))
+        {
             let places: Vec<Px> = run.iter().map(|p| (x.px(p.x), y.px(p.y))).collect();
             let data = if series.mark == Mark::Steps {
                 polyline(steps(&places, frame.area).into_iter())

@@ -202,7 +202,8 @@ impl SlotChart {
             let box_px = if slot.quartiles.is_some() { place.box_width() / 2.0 } else { 0.0 };
             let widest = asides.iter().fold(box_px, |widest, aside| widest.max(aside.abs()));
             // The first of several joined slots has its mean on the left, where no line is.
-            let side = if self.is_joined && index == 0 && self.slots.len() > 1 { -1.0 } else { 1.0 };
+            let side =
+                if self.is_joined && index == 0 && self.slots.len() > 1 { -1.0 } else { 1.0 };
             let x = place.center + side * place.mean_aside(widest);
             place.draw_mean(frame, x, mean, interval);
         }
@@ -245,13 +246,7 @@ impl SlotPlace {
         frame.svg.line((left, median), (left + width, median), &thick);
     }
 
-    fn draw_mean(
-        &self,
-        frame: &mut ChartFrame,
-        x: f64,
-        mean: f64,
-        interval: Option<(f64, f64)>,
-    ) {
+    fn draw_mean(&self, frame: &mut ChartFrame, x: f64, mean: f64, interval: Option<(f64, f64)>) {
         if let Some((low, high)) = interval.filter(|(l, h)| l.is_finite() && h.is_finite()) {
             let ends = (frame.y.px(low), frame.y.px(high));
             error_bar(&mut frame.svg, x, ends, 1.1 * self.radius, INK);
@@ -325,6 +320,10 @@ mod tests {
         let chart = SlotChart::new("T", Axis::linear("y"), slots).joined();
         let drawn = chart.draw(&Style::CHART).unwrap();
         assert_eq!(drawn.spots.len(), 5);
-        assert_eq!(drawn.svg.matches("stroke-opacity").count(), 2, "a seed without a pair has no line");
+        assert_eq!(
+            drawn.svg.matches("stroke-opacity").count(),
+            2,
+            "a seed without a pair has no line"
+        );
     }
 }

@@ -5,6 +5,7 @@
 //! metric joined, and their differences; a parameter of numbers gives lines, two of several levels a heat map; two metrics
 //! of several variants are shown against each other.
 
+use super::Label;
 use super::charts;
 use super::compare::BaselineIndex;
 use super::forest_chart::forest;
@@ -13,7 +14,6 @@ use super::label::capitalized;
 use super::run_charts::{VariantNames, boxed_runs, differences, joined_runs, shares_up_to};
 use super::summary::MetricSummary;
 use super::table::RunColumn;
-use super::Label;
 use sidestep_document::figure::Point;
 use sidestep_document::{Figure, FigureKind, Series};
 use sidestep_statistics::rank_correlation;
@@ -74,7 +74,10 @@ pub(super) fn figures(context: &LeadContext<'_>) -> Vec<Figure> {
 }
 
 /// Returns the first metrics of which none goes with another.
-fn independent_metrics<'a>(groups: &RunGroups<'_>, columns: &[&'a RunColumn]) -> Vec<&'a RunColumn> {
+fn independent_metrics<'a>(
+    groups: &RunGroups<'_>,
+    columns: &[&'a RunColumn],
+) -> Vec<&'a RunColumn> {
     let mut own: Vec<&RunColumn> = Vec::with_capacity(MAX_METRICS);
     for column in columns {
         if own.len() == MAX_METRICS {

@@ -162,7 +162,8 @@ pub(super) fn shares_up_to(groups: &RunGroups<'_>, metric: &RunColumn) -> Option
             return None;
         }
         let n = sorted.len();
-        let share = |(k, value): (usize, &f64)| Point::new(*value, (k + 1) as f64 / n as f64).with_runs(n);
+        let share =
+            |(k, value): (usize, &f64)| Point::new(*value, (k + 1) as f64 / n as f64).with_runs(n);
         let points = sorted.iter().enumerate().map(share).collect();
         series.push(Series { name: name.clone(), points });
     }

@@ -313,7 +313,8 @@ fn the_first_page_has_the_comparison_against_zero_and_at_most_six_figures() {
 
 #[test]
 fn two_variants_are_shown_seed_by_seed() {
-    let values = (0..24).map(|k| f64::from(k % 12) + 0.1 * f64::from(k * k % 7) + f64::from(k / 12));
+    let values =
+        (0..24).map(|k| f64::from(k % 12) + 0.1 * f64::from(k * k % 7) + f64::from(k / 12));
     let metrics = vec![column("lag_m", Role::Metric, numbers(values))];
     let summary = summed(&two_variants(12, metrics));
     let kinds: Vec<&FigureKind> = summary.lead_figures().iter().map(|f| &f.kind).collect();

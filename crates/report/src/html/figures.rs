@@ -181,8 +181,7 @@ mod tests {
 
     #[test]
     fn nothing_in_a_picture_ends_its_address_or_its_attribute() {
-        let image =
-            image("<a b=\"#1\">50 % &amp; 'c'</a>\n", "\"A\" & <b>").into_string();
+        let image = image("<a b=\"#1\">50 % &amp; 'c'</a>\n", "\"A\" & <b>").into_string();
         assert_eq!(
             image,
             "<img src='data:image/svg+xml;charset=utf-8,<a b=\"%231\">50 %25 %26amp; \

@@ -34,7 +34,7 @@ pub(super) fn tree_tables(title: &str, tree: &Value, meanings: &[MetricInfo]) ->
 }
 
 /// Returns words with a capital first letter, as at the beginning of a sentence.
-fn capitalize(words: &str) -> String {
+pub(super) fn capitalize(words: &str) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     first + letters.as_str()

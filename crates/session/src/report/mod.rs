@@ -4,12 +4,13 @@
 //! run.rs        a run folder -> a document       metrics.rs   numbers of a summary -> tables
 //! sweep.rs      the folder of a sweep -> a document
 //! tables.rs     its tables and columns           events.rs    timeline of events
-//! text.rs       numbers as text
+//! text.rs       numbers as text                   series.rs    metrics over time
 //! ```
 
 mod events;
 mod metrics;
 mod run;
+mod series;
 mod sweep;
 mod tables;
 mod text;

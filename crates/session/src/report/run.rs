@@ -2,7 +2,7 @@
 //! everything else follows from the schemas of the recorded tables.
 
 use super::text::{format_count, format_duration};
-use super::{events, metrics, tables};
+use super::{events, metrics, series, tables};
 use crate::flight::cut_off_text;
 use crate::read_summary;
 use crate::recorded_run::nothing_recorded;
@@ -36,12 +36,15 @@ pub(super) fn document(worlds: &Worlds, folder: &Path) -> Result<Document, Input
     if let Some(picture) = picture(folder)? {
         document.section("Where everybody went").pictures([picture]);
     }
+    let meanings = worlds.find(&view.manifest.world).map_or(&[][..], |kind| kind.metric_infos());
     if let Some(summary) = &summary {
-        let meanings =
-            worlds.find(&view.manifest.world).map_or(&[][..], |kind| kind.metric_infos());
         append_metrics(&mut document, &view.manifest, summary, meanings);
     }
-    for table in tables::table_names(folder)? {
+    let tables = tables::table_names(folder)?;
+    if tables.iter().any(|name| name == series::TABLE) {
+        series::append(&mut document, folder, meanings)?;
+    }
+    for table in tables {
         events::append(&mut document, folder, &table)?;
     }
     document.section("What was run").push(Block::Facts(facts(&view, summary.as_ref())));

@@ -3,8 +3,8 @@
 use super::text::{format_count, format_duration};
 use crate::sweep::{FinishedRuns, Folder, read_finished, run_picture};
 use crate::{Error, Watcher};
-use sidestep_document::{Figure, Table};
 use sidestep_document::document::{Block, Code, Document, Picture, Text};
+use sidestep_document::{Figure, Table};
 use sidestep_experiment::sweep::rounds::{VariantStop, variant_stops};
 use sidestep_experiment::sweep::{Plan, Role, RunTable, Summary, Trial, Variant};
 use sidestep_kernel::ports::ColumnValues;
