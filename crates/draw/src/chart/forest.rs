@@ -287,10 +287,8 @@ mod tests {
         let narrow = Style { width_px: 240.0, ..Style::CHART };
         let svg = chart([1.0, 2.0, 3.0, 4.0], long).draw(&narrow).unwrap().svg;
         assert!(!svg.contains(long) && svg.contains("difference"), "{svg}");
-        let short = ForestChart::new("T", Axis::linear(""), ["a"]).series(ForestSeries {
-            label: String::new(),
-            marks: vec![],
-        });
+        let short = ForestChart::new("T", Axis::linear(""), ["a"])
+            .series(ForestSeries { label: String::new(), marks: vec![] });
         assert!(short.draw(&narrow).is_err());
     }
 }

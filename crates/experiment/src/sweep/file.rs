@@ -2,6 +2,7 @@
 
 use super::baseline::BaselineSpec;
 use super::design::{Design, Factor, LatinHypercube, ParameterRange};
+use super::front::{Aim, Better};
 use super::variant::{Setting, Variant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,11 +45,16 @@ pub struct Sweep {
     pub until: Option<Precision>,
     /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
+    /// Metrics with the values that are better; the first two are shown with their front.
+    pub better: Vec<Aim>,
     /// The variant that others are compared with; empty for no comparison.
     pub baseline: BaselineSpec,
     /// Whether every run is recorded in a folder of its own.
     pub record: bool,
 }
+
+/// Number of metrics that a front has.
+const AIMS: usize = 2;
 
 /// A requested precision: a variant is run until the 95 % confidence intervals of means are this
 /// narrow.
@@ -128,6 +134,11 @@ struct SweepFile {
     /// Metrics to report; all that vary if none is named.
     #[serde(default)]
     metrics: Vec<String>,
+    /// Which values of two metrics are better, `low` or `high`: a figure shows the front of the variants, those that no other
+    /// one beats in both.
+    #[serde(default)]
+    #[schemars(with = "AnyTable")]
+    better: Option<Spanned<toml::Table>>,
     /// The variant that others are compared with: values of keys, or its name.
     #[schemars(with = "Option<BaselineValue>")]
     baseline: Option<Spanned<Value>>,
@@ -212,6 +223,7 @@ impl Sweep {
             first_seed: None,
             until: None,
             metrics: Vec::new(),
+            better: Vec::new(),
             baseline: BaselineSpec::default(),
             record: false,
         }
@@ -263,6 +275,10 @@ impl Sweep {
             Some(baseline) => reader.baseline(baseline)?,
             None => BaselineSpec::default(),
         };
+        let better = match &file.better {
+            Some(table) => reader.aims(table)?,
+            None => Vec::new(),
+        };
         Ok(Self {
             place: source.place.clone(),
             scenario: source.path(&file.scenario),
@@ -273,6 +289,7 @@ impl Sweep {
             first_seed: file.first_seed,
             until,
             metrics: file.metrics,
+            better,
             baseline,
             name: file.name,
             record: file.record,
@@ -382,6 +399,28 @@ impl SweepReader<'_> {
                 Err(self.source.error(Some(table.span()), cause, "give a word, in quotes"))
             }
         }
+    }
+
+    /// Returns which values of metrics are better.
+    fn aims(&self, table: &Spanned<toml::Table>) -> Result<Vec<Aim>, InputError> {
+        let wrong = |cause: &str| {
+            let remedy =
+                "name two metrics: better = { mean_delay_percent = \"low\", trips = \"high\" }";
+            self.source.error(Some(table.span()), cause, remedy)
+        };
+        let mut aims = Vec::new();
+        for (metric, value) in leaves(table.get_ref(), &|_| false) {
+            let better = match value.as_str() {
+                Some("low") => Better::Low,
+                Some("high") => Better::High,
+                _ => return Err(wrong("better values of a metric are `low` or `high` ones")),
+            };
+            aims.push(Aim { metric, better });
+        }
+        if aims.len() != AIMS {
+            return Err(wrong("a front is that of two metrics"));
+        }
+        Ok(aims)
     }
 
     /// Returns the baseline: a table of settings, or the name of a variant.

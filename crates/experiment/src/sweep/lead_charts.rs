@@ -9,6 +9,7 @@ use super::Label;
 use super::charts;
 use super::compare::BaselineIndex;
 use super::forest_chart::forest;
+use super::front::{Better, front_corners};
 use super::groups::{Level, Parameter, RunGroups};
 use super::label::capitalized;
 use super::run_charts::{VariantNames, boxed_runs, differences, joined_runs, shares_up_to};
@@ -29,7 +30,7 @@ const MIN_LEVELS: usize = 3;
 /// Largest number of levels of a factor of a heat map.
 const MAX_LEVELS: usize = 30;
 /// Variants that are shown by two metrics against each other.
-const MIN_POINTS: usize = 4;
+const MIN_POINTS: usize = 3;
 const MAX_POINTS: usize = 35;
 
 /// What the first page is chosen from.
@@ -39,11 +40,13 @@ pub(super) struct LeadContext<'a> {
     pub(super) columns: &'a [&'a RunColumn],
     pub(super) metrics: &'a [MetricSummary],
     pub(super) reference: Option<&'a BaselineIndex>,
+    /// Two metrics with the values that are better, or none.
+    pub(super) aims: &'a [(&'a RunColumn, Better)],
 }
 
 /// Returns the figures of the first page.
 pub(super) fn figures(context: &LeadContext<'_>) -> Vec<Figure> {
-    let LeadContext { groups, columns, metrics, reference } = *context;
+    let LeadContext { groups, columns, metrics, reference, aims } = *context;
     let own = independent_metrics(groups, columns);
     let Some(first) = own.first().copied() else { return Vec::new() };
     let mut figures: Vec<Figure> = Vec::new();
@@ -66,7 +69,11 @@ pub(super) fn figures(context: &LeadContext<'_>) -> Vec<Figure> {
             figures.extend(boxed_runs(groups, metric));
         }
     }
-    if let [first, second, ..] = own[..] {
+    // A front that was asked for comes right after the comparison.
+    if let [x, y] = aims {
+        let place = figures.len().min(1);
+        figures.splice(place..place, front(groups, [*x, *y]));
+    } else if let [first, second, ..] = own[..] {
         figures.extend(trade_off(groups, [first, second]));
     }
     figures.truncate(MAX_FIGURES);
@@ -153,6 +160,21 @@ fn heat_row(
     Series { name: upward.levels[row].name(), points }
 }
 
+/// Returns two metrics with the front of the variants that no other one beats in both.
+fn front(groups: &RunGroups<'_>, [x, y]: [(&RunColumn, Better); 2]) -> Option<Figure> {
+    let figure = trade_off(groups, [x.0, y.0])?;
+    let points = figure.series.iter().flat_map(|series| &series.points);
+    let means: Vec<(f64, f64)> = points.map(|point| (point.x, point.y)).collect();
+    let corners = front_corners(&means, [x.1, y.1]);
+    let [x_words, y_words] =
+        [x, y].map(|(metric, better)| format!("{} {}", better.word(), groups.label(metric).text));
+    let note = format!(
+        "{} On the dashed front are the variants that no other one beats in both: {x_words}, {y_words}.",
+        figure.note
+    );
+    Some(Figure { note, kind: FigureKind::Front { corners }, ..figure })
+}
+
 /// Returns two metrics against each other, a point for each variant.
 fn trade_off(groups: &RunGroups<'_>, [x, y]: [&RunColumn; 2]) -> Option<Figure> {
     if !(MIN_POINTS..=MAX_POINTS).contains(&groups.variants.len()) {
@@ -170,7 +192,7 @@ fn trade_off(groups: &RunGroups<'_>, [x, y]: [&RunColumn; 2]) -> Option<Figure> 
     }
     let [x_label, y_label] = [x, y].map(|metric| groups.label(metric));
     Some(Figure {
-        title: format!("{} against {}", capitalized(&y_label), x_label.text),
+        title: format!("{} and {}", capitalized(&y_label), x_label.text),
         note: "Means of the variants with 95 % intervals.".into(),
         x_label: x_label.to_string(),
         y_label: y_label.to_string(),

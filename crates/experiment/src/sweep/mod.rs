@@ -27,6 +27,7 @@
 //! charts.rs    the summary as figures: each metric over each parameter
 //! run_charts.rs    the runs of variants: joined by seed, differences, boxes, shares up to a value
 //! forest_chart.rs  all comparisons against zero
+//! front.rs         the variants that no other one beats in two metrics
 //! lead_charts.rs   the first page: the figures that show what differs
 //! ```
 //!
@@ -42,6 +43,7 @@ pub mod compare;
 pub mod design;
 pub mod file;
 mod forest_chart;
+mod front;
 mod groups;
 pub mod label;
 mod lead_charts;
@@ -67,6 +69,7 @@ pub use column_schema::ColumnSchema;
 pub use compare::Comparison;
 pub use design::{Design, Factor, LatinHypercube, ParameterRange};
 pub use file::{Precision, Sweep};
+pub use front::{Aim, Better};
 pub use groups::{Level, Parameter};
 pub use label::Label;
 pub use options::{BaselineChoice, SummaryOptions};

@@ -1,5 +1,6 @@
 //! Options of a summary.
 
+use super::front::Aim;
 use sidestep_scenario::MetricInfo;
 use sidestep_statistics::Bootstrap;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,6 +15,8 @@ pub struct SummaryOptions {
     /// The baseline of variants; `None` for the first variant, but for nothing in grids of
     /// several parameters and in scattered designs, where the first is like no other.
     pub against: Option<BaselineChoice>,
+    /// Two metrics with the values that are better, of which a figure shows the front; or none.
+    pub better: Vec<Aim>,
     /// Names of the variants, where the table has their numbers.
     pub names: Option<Vec<String>>,
     /// Variants in which seeds change nothing: their one value has no interval.
@@ -46,6 +49,7 @@ impl Default for SummaryOptions {
     fn default() -> Self {
         Self {
             metrics: None,
+            better: Vec::new(),
             names: None,
             // As many as one looks through; the others are listed as left out.
             max_metrics: 12,

@@ -2,6 +2,7 @@
 
 use super::baseline::{Baseline, BaselineMatcher};
 use super::file::{Precision, Sweep};
+use super::front::Aim;
 use super::variant::{BaseScenario, Setting, Variant};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -37,6 +38,9 @@ pub struct Plan {
     pub until: Option<Precision>,
     /// The metrics to report; all that vary if empty.
     pub metrics: Vec<String>,
+    /// Two metrics with the values that are better, or none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub better: Vec<Aim>,
     /// The baseline that the variants are compared with.
     pub baseline: Option<Baseline>,
     /// Number of agents of the largest variant.
@@ -112,6 +116,7 @@ impl Plan {
             first_seed,
             until: sweep.until.clone(),
             metrics: sweep.metrics.clone(),
+            better: sweep.better.clone(),
             baseline: None,
             agents: 0,
             record: sweep.record,

@@ -40,6 +40,7 @@ impl Plan {
         let options = SummaryOptions {
             metrics: (!self.metrics.is_empty()).then(|| self.metrics.clone()),
             seedless,
+            better: self.better.clone(),
             privilege_note: self.privilege_note(),
             against: self.baseline.as_ref().map(|baseline| baseline_choice(baseline, &names)),
             meanings: world.map_or(&[], WorldType::metric_infos),

@@ -11,6 +11,7 @@
 //! every metric that is not shown, and why.
 use super::charts;
 use super::compare::{BaselineIndex, Comparison, comparisons};
+use super::front::Better;
 use super::groups::{Level, RunGroups};
 use super::lead_charts::{self, LeadContext};
 use super::options::{BaselineChoice, SummaryOptions};
@@ -80,6 +81,7 @@ impl Summary {
             columns: &columns,
             metrics: &metrics,
             reference: reference.as_ref(),
+            aims: &aims(&groups, options)?,
         });
         let mut summary = Self {
             runs: table.runs(),
@@ -236,6 +238,18 @@ fn select_metrics<'a>(
         left_out.push(OmittedMetric { metric: column.name.clone(), reason });
     }
     Ok((shown.into_iter().map(|(_, column)| column).collect(), left_out))
+}
+
+/// Returns the columns of the metrics of which some values are better.
+fn aims<'a>(
+    groups: &RunGroups<'a>,
+    options: &SummaryOptions,
+) -> Result<Vec<(&'a RunColumn, Better)>, InputError> {
+    let all: Vec<&RunColumn> = groups.table.columns_with_role(Role::Metric).collect();
+    let names: Vec<String> = options.better.iter().map(|aim| aim.metric.clone()).collect();
+    let (columns, _) = metrics_by_name(&all, &names)?;
+    let directions = options.better.iter().map(|aim| aim.better);
+    Ok(columns.into_iter().zip(directions).collect())
 }
 
 fn metrics_by_name<'a>(

@@ -312,6 +312,20 @@ fn the_first_page_has_the_comparison_against_zero_and_at_most_six_figures() {
 }
 
 #[test]
+fn a_front_that_is_asked_for_follows_the_comparison_and_knows_its_metrics() {
+    let aim = |metric: &str| Aim { metric: metric.into(), better: Better::Low };
+    let better = vec![aim("mean_delay_percent"), aim("noise_m")];
+    let options = SummaryOptions { better, ..Default::default() };
+    let summary = Summary::from_table(&grid(), &options).unwrap();
+    let figure = &summary.lead_figures()[1];
+    let FigureKind::Front { corners } = &figure.kind else { panic!("a front") };
+    assert!(!corners.is_empty() && figure.note.contains("lower mean delay"), "{}", figure.note);
+    let options = SummaryOptions { better: vec![aim("mean_delay"), aim("noise_m")], ..options };
+    let error = Summary::from_table(&grid(), &options).unwrap_err().to_string();
+    assert!(error.contains("mean_delay_percent"), "{error}");
+}
+
+#[test]
 fn two_variants_are_shown_seed_by_seed() {
     let values =
         (0..24).map(|k| f64::from(k % 12) + 0.1 * f64::from(k * k % 7) + f64::from(k / 12));

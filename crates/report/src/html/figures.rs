@@ -37,7 +37,10 @@ fn chart(figure: &Figure, drawn: &PagePicture) -> Markup {
     let spots: Vec<_> = drawn.spots.iter().map(spot_json).collect();
     let data = json!({ "figure": figure, "spots": spots });
     html! {
-        div .canvas { (inline_svg(&drawn.file.svg, &alt_text(figure))) }
+        // What scrolls on a telephone must be reached by keyboard, too.
+        @let is_full = has_full_width(figure);
+        div .canvas tabindex=[is_full.then_some("0")] role=[is_full.then_some("region")]
+            aria-label=[is_full.then(|| format!("Figure: {}", figure.title))] { (inline_svg(&drawn.file.svg, &alt_text(figure))) }
         script type="application/json" { (PreEscaped(safe_json(&data))) }
         @if !figure.note.is_empty() { p .note { (figure.note) } }
         @if let Some(numbers) = numbers_table(figure) {
