@@ -29,7 +29,7 @@ fn texts(svg: &str) -> (Vec<(String, Rect)>, f32, f32) {
             }
         }
     }
-    let tree = parse(svg).unwrap();
+    let tree = parse(svg, &Fonts::default()).unwrap();
     let mut found = vec![];
     walk(tree.root(), &mut found);
     (found, tree.size().width(), tree.size().height())
@@ -233,7 +233,7 @@ proptest! {
             .ideal_line("i", ideal.0, ideal.1)
             .series(Series::line("l", points.clone()))
             .series(Series::points("p", points));
-        prop_assert!(parse(&plot.to_svg(&Style::CHART).unwrap()).is_ok());
+        prop_assert!(parse(&plot.to_svg(&Style::CHART).unwrap(), &Fonts::default()).is_ok());
     }
 
     #[test]
@@ -245,7 +245,7 @@ proptest! {
         let chart = BarChart::new("", values.iter().map(|_| "name"))
             .y_axis(y)
             .series(BarSeries::new("s", values.iter().map(bar).collect()));
-        prop_assert!(parse(&chart.to_svg(&Style::CHART).unwrap()).is_ok());
+        prop_assert!(parse(&chart.to_svg(&Style::CHART).unwrap(), &Fonts::default()).is_ok());
     }
 
     #[test]
@@ -282,7 +282,7 @@ proptest! {
         ];
         let drawn = draw(&scenery, &moment(bodies), &trails, &options(Style::MAP, &scenery));
         if let Ok(svg) = drawn {
-            prop_assert!(parse(&svg).is_ok());
+            prop_assert!(parse(&svg, &Fonts::default()).is_ok());
         }
     }
 }

@@ -150,7 +150,8 @@ impl ForestChart {
     fn limit(&self) -> f64 {
         let mut distances: Vec<f64> = self.ends().map(f64::abs).collect();
         distances.sort_by(f64::total_cmp);
-        let third_quartile = distances.get(distances.len() * 3 / 4).copied().unwrap_or(0.0);
+        let rank = distances.len().saturating_sub(1) * 3 / 4;
+        let third_quartile = distances.get(rank).copied().unwrap_or(0.0);
         if third_quartile > 0.0 { MAX_SPREAD * third_quartile } else { f64::INFINITY }
     }
 
