@@ -29,7 +29,9 @@ pub(super) struct VariantNames {
 
 impl VariantNames {
     pub(super) fn new(groups: &RunGroups<'_>) -> Self {
-        let are_settings = groups.variants.iter().all(|name| name.contains('='));
+        // Names made of settings, or numbers in place of names.
+        let is_setting = |name: &String| name.contains('=') || name.parse::<u64>().is_ok();
+        let are_settings = groups.variants.iter().all(is_setting);
         if let [parameter] = &groups.parameters[..]
             && are_settings
         {
