@@ -21,7 +21,8 @@ pub(super) const MIN_STEPS_RUNS: usize = 10;
 /// Reach of whiskers beyond the box, in interquartile ranges, as Tukey drew it.
 const WHISKER_RANGES: f64 = 1.5;
 
-/// Short names of the variants, and what they are as a whole: where one parameter tells them apart, its values and its name.
+/// Short names of the variants, and what they are as a whole: where one parameter of words tells them
+/// apart, its values and its name.
 pub(super) struct VariantNames {
     pub(super) names: Vec<String>,
     pub(super) label: String,
@@ -32,8 +33,10 @@ impl VariantNames {
         // Names made of settings, or numbers in place of names.
         let is_setting = |name: &String| name.contains('=') || name.parse::<u64>().is_ok();
         let are_settings = groups.variants.iter().all(is_setting);
+        // A number alone says nothing.
         if let [parameter] = &groups.parameters[..]
             && are_settings
+            && !parameter.numeric
         {
             let level = |variant: usize| parameter.levels[parameter.of_variant[variant]].name();
             let names = (0..groups.variants.len()).map(level).collect();
