@@ -55,11 +55,11 @@ pub(super) fn figures(context: &LeadContext<'_>) -> Vec<Figure> {
     }
     let has_axis = groups.parameters.iter().any(|p| p.numeric);
     if has_axis {
+        figures.extend(heat_figure(groups, first));
         for metric in &own {
             figures.extend(axis_figures(groups, metric));
         }
-        figures.extend(heat_figure(groups, first));
-        // One parameter has one figure of each metric; of several, those of the first metric are more than enough.
+        // The last place is that of two metrics against each other.
         figures.truncate(MAX_FIGURES - 1);
     } else if groups.variants.len() > 1 {
         figures.extend(joined_runs(groups, first));
