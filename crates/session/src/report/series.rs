@@ -53,7 +53,9 @@ fn lead(table: &Table, figures: usize) -> String {
         0 => String::new(),
         n => format!(" {n} more metrics change, and are in the table alone."),
     };
-    format!("Metrics after {rows} cycles that follow from their numbers alone.{beyond}")
+    format!(
+        "{rows} values of each metric, after cycles that follow from their numbers alone.{beyond}"
+    )
 }
 
 /// Returns whether a column has numbers that differ.
@@ -72,7 +74,9 @@ fn figure(name: &str, cycles: &[u64], values: &ColumnValues, meanings: &[MetricI
     let last = cycles.len().saturating_sub(1);
     let rows = (0..cycles.len()).filter(|row| row % step == 0 || *row == last);
     let point = |row: usize| Point::new(cycles[row] as f64, values.number(row).unwrap_or(f64::NAN));
-    let note = if meaning.is_empty() { String::new() } else { format!("{meaning}.") };
+    // A meaning that only repeats the words says nothing more.
+    let is_told = meaning.is_empty() || meaning == words;
+    let note = if is_told { String::new() } else { format!("{meaning}.") };
     Figure {
         title: capitalize(&words),
         note: capitalize(&note),
