@@ -77,7 +77,19 @@ pub(super) fn figures(context: &LeadContext<'_>) -> Vec<Figure> {
         figures.extend(trade_off(groups, [first, second]));
     }
     figures.truncate(MAX_FIGURES);
+    for figure in &mut figures {
+        add_privilege_note(figure, groups.privilege_note);
+    }
     figures
+}
+
+/// Adds the note on variants in which somebody knows what no agent could, where a figure has it not yet.
+fn add_privilege_note(figure: &mut Figure, privilege_note: Option<&str>) {
+    if let Some(note) = privilege_note
+        && !figure.note.contains(note)
+    {
+        figure.note = format!("{} {note}", figure.note);
+    }
 }
 
 /// Returns the first metrics of which none goes with another.

@@ -4,6 +4,7 @@
 use super::compare::BaselineIndex;
 use super::groups::RunGroups;
 use super::label::capitalized;
+use super::plan::PRIVILEGE_MARK;
 use super::table::RunColumn;
 use sidestep_document::figure::{Point, SlotStats};
 use sidestep_document::{Figure, FigureKind, Series};
@@ -38,8 +39,12 @@ impl VariantNames {
             && are_settings
             && !parameter.numeric
         {
-            let level = |variant: usize| parameter.levels[parameter.of_variant[variant]].name();
-            let names = (0..groups.variants.len()).map(level).collect();
+            let mut names = Vec::with_capacity(groups.variants.len());
+            for (variant, name) in groups.variants.iter().enumerate() {
+                let level = parameter.levels[parameter.of_variant[variant]].name();
+                let mark = if name.ends_with(PRIVILEGE_MARK) { PRIVILEGE_MARK } else { "" };
+                names.push(level + mark);
+            }
             return Self { names, label: parameter.name.clone() };
         }
         Self { names: groups.variants.clone(), label: "variant".into() }
