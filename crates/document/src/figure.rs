@@ -163,8 +163,8 @@ impl Figure {
         }
     }
 
-    /// Returns the points as a table of comma-separated values with a head: the series, the position, the value, the ends of
-    /// its interval and of that of the position, and the number of runs; what a point has not is empty.
+    /// Returns the points as a table of comma-separated values with a head: the series, the position, the value, the
+    /// ends of its interval and of that of the position, and the number of runs; what a point has not is empty.
     pub fn csv(&self) -> String {
         let [x, y] = self.column_labels().map(csv_cell);
         let mut text = format!("series,{x},{y},low,high,x_low,x_high,n\n");

@@ -38,8 +38,8 @@ const PX_PER_INCH: f32 = 96.0;
 /// Inches per meter.
 const INCHES_PER_M: f64 = 1.0 / 0.0254;
 
-/// Rasterizes an SVG picture with `dpi` pixels per inch of its size, and writes that into the file, so that programs show it
-/// in that size.
+/// Rasterizes an SVG picture with `dpi` pixels per inch of its size, and writes that into the file, so that programs
+/// show it in that size.
 ///
 /// # Errors
 /// As [`to_png`].

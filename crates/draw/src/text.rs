@@ -35,8 +35,8 @@ impl Default for Fonts {
 }
 
 impl Fonts {
-    /// Returns the embedded font, and before it the font of a file, as TrueType or OpenType: pictures in it are laid out
-    /// for DejaVu Sans, which is wider than most.
+    /// Returns the embedded font, and before it the font of a file, as TrueType or OpenType: pictures in it are laid
+    /// out for DejaVu Sans, which is wider than most.
     ///
     /// # Errors
     /// [`DrawError::Font`] if the bytes are no such font.

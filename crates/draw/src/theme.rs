@@ -2,7 +2,8 @@
 
 use crate::style::{FAINT_INK, GRID, GROUND, INK};
 
-/// The colors of charts, and those that take their places on a dark ground: as far from it as the others are from white.
+/// The colors of charts, and those that take their places on a dark ground: as far from it as the others are from
+/// white.
 pub const DARK_COLORS: [(&str, &str); 11] = [
     (GROUND, "#14171C"),
     (INK, "#E4E7EC"),

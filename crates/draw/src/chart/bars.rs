@@ -90,7 +90,8 @@ impl BarChart {
         }
     }
 
-    /// Draws markers in place of bars. They need no zero on the axis, so that small differences of large values are seen.
+    /// Draws markers in place of bars. They need no zero on the axis, so that small differences of large values are
+    /// seen.
     #[must_use]
     pub fn dots(mut self) -> Self {
         self.are_dots = true;

@@ -9,8 +9,8 @@ use crate::style::{GROUND, Style, hex};
 use crate::svg::{Anchor, Rect, TextStyle};
 use crate::text::{self, Weight};
 
-/// Colors from the least to the greatest value: viridis of matplotlib at its quarters. Its lightness rises evenly, so that
-/// it is read in gray, too, and with every common color blindness.
+/// Colors from the least to the greatest value: viridis of matplotlib at its quarters. Its lightness rises evenly, so
+/// that it is read in gray, too, and with every common color blindness.
 const COLORS: [[u8; 3]; 5] =
     [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 /// Number of colors that the legend shows.
@@ -43,7 +43,8 @@ impl HeatChart {
     /// Draws the chart.
     ///
     /// # Errors
-    /// [`DrawError::Length`] if values and levels are not equally many, [`DrawError::Value`] if the style is impossible.
+    /// [`DrawError::Length`] if values and levels are not equally many, [`DrawError::Value`] if the style is
+    /// impossible.
     pub fn draw(&self, style: &Style) -> Result<DrawnChart, DrawError> {
         style.check()?;
         DrawError::length("rows of a heat map", self.rows.len(), self.values.len())?;

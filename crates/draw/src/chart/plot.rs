@@ -56,8 +56,8 @@ pub enum Mark {
     Path,
     /// Markers only.
     Points,
-    /// Steps: level up to the next point, as a share of runs is; the first one rises from the low end of the axis, and the
-    /// last level goes on to its right end.
+    /// Steps: level up to the next point, as a share of runs is; the first one rises from the low end of the axis,
+    /// and the last level goes on to its right end.
     Steps,
 }
 

@@ -256,8 +256,8 @@ impl SlotPlace {
     }
 }
 
-/// Returns how far aside of the middle each of some heights stands, so that marks `size_px` large touch as little as they can
-/// within `room_px` to either side. Each takes the first free place, nearest to the middle first.
+/// Returns how far aside of the middle each of some heights stands, so that marks `size_px` large touch as little as
+/// they can within `room_px` to either side. Each takes the first free place, nearest to the middle first.
 fn swarm(heights: &[f64], size_px: f64, room_px: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..heights.len()).collect();
     order.sort_by(|a, b| heights[*a].total_cmp(&heights[*b]));

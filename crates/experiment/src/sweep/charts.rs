@@ -2,10 +2,10 @@
 //!
 //! A numeric parameter gives lines, one for each combination of the other parameters; if there are
 //! more than [`MAX_SERIES`] of these, numeric parameters among them are averaged over, then also
-//! parameters of words. A parameter of words gives the runs beside each other, or dots of means. Averages are only taken in full grids. If
-//! variants are samples of a box, as in a Latin hypercube, they are points: in the box itself, if it
-//! has two sides, and over each side. Without
-//! parameters the variants stand beside each other, and a single variant is shown by its distribution over runs.
+//! parameters of words. A parameter of words gives the runs beside each other, or dots of means. Averages are only
+//! taken in full grids. If variants are samples of a box, as in a Latin hypercube, they are points: in the box
+//! itself, if it has two sides, and over each side. Without parameters the variants stand beside each other, and a
+//! single variant is shown by its distribution over runs.
 
 use super::Label;
 use super::groups::{Level, Parameter, RunGroups};
@@ -155,7 +155,8 @@ struct AxisScales {
 
 /// Least ratio of the ends of an axis for a logarithmic scale.
 const MIN_LOG_RATIO: f64 = 8.0;
-/// Least ratio of the widest to the narrowest step between levels: levels that multiply have such, levels that add have not.
+/// Least ratio of the widest to the narrowest step between levels: levels that multiply have such, levels that add
+/// have not.
 const MIN_STEP_RATIO: f64 = 3.0;
 
 impl AxisScales {
@@ -198,7 +199,8 @@ impl AxisScales {
     }
 }
 
-/// Returns the largest of some positive numbers divided by the least; `None` for fewer than two, or one that is not positive.
+/// Returns the largest of some positive numbers divided by the least; `None` for fewer than two, or one that is not
+/// positive.
 fn ratio(values: &[f64]) -> Option<f64> {
     let low = values.iter().copied().reduce(f64::min)?;
     let high = values.iter().copied().reduce(f64::max)?;

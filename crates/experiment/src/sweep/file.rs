@@ -134,8 +134,8 @@ struct SweepFile {
     /// Metrics to report; all that vary if none is named.
     #[serde(default)]
     metrics: Vec<String>,
-    /// Which values of two metrics are better, `low` or `high`: a figure shows the front of the variants, those that no other
-    /// one beats in both.
+    /// Which values of two metrics are better, `low` or `high`: a figure shows the front of the variants, those that
+    /// no other one beats in both.
     #[serde(default)]
     #[schemars(with = "AnyTable")]
     better: Option<Spanned<toml::Table>>,

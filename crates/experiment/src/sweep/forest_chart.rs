@@ -14,7 +14,8 @@ const MAX_SERIES: usize = 4;
 /// Largest number of marks.
 const MAX_MARKS: usize = 24;
 
-/// Returns all differences of all metrics from the baseline; of many variants, those of the first metric. `None` without any.
+/// Returns all differences of all metrics from the baseline; of many variants, those of the first metric. `None`
+/// without any.
 pub(super) fn forest(
     groups: &RunGroups<'_>,
     metrics: &[MetricSummary],

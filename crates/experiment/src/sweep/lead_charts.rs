@@ -1,9 +1,9 @@
 //! The first page of a summary: at most six figures, chosen by what is compared and by what differs.
 //!
-//! Metrics come in the order of the summary, the most informative first; one that goes up and down with an earlier one says
-//! the same again, and is passed over. Variants that are compared give a forest of all metrics, the seeds of the first
-//! metric joined, and their differences; a parameter of numbers gives lines, two of several levels a heat map; two metrics
-//! of several variants are shown against each other.
+//! Metrics come in the order of the summary, the most informative first; one that goes up and down with an earlier
+//! one says the same again, and is passed over. Variants that are compared give a forest of all metrics, the seeds of
+//! the first metric joined, and their differences; a parameter of numbers gives lines, two of several levels a heat
+//! map; two metrics of several variants are shown against each other.
 
 use super::Label;
 use super::charts;

@@ -1,5 +1,5 @@
-//! The runs themselves as figures: joined seed by seed, as differences from the baseline, as boxes, and as shares of runs up
-//! to each value.
+//! The runs themselves as figures: joined seed by seed, as differences from the baseline, as boxes, and as shares of
+//! runs up to each value.
 
 use super::compare::BaselineIndex;
 use super::groups::RunGroups;
@@ -56,7 +56,8 @@ pub(super) fn is_number(metric: &RunColumn) -> bool {
     !matches!(metric.values, ColumnValues::Bool(_) | ColumnValues::Text(_))
 }
 
-/// Returns the runs of all variants, those of one seed joined; `None` where variants are too many, or have no seeds in common.
+/// Returns the runs of all variants, those of one seed joined; `None` where variants are too many, or have no seeds
+/// in common.
 pub(super) fn joined_runs(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<Figure> {
     let has_pairs = groups.paired && groups.replicates.len() > 1;
     let is_seeded = !groups.seedless.contains(&true);

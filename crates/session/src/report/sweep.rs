@@ -170,8 +170,8 @@ fn reproduction_commands(folder: &Folder) -> String {
     )
 }
 
-/// Appends the figures that show what differs and one table of everything, then every metric in a section of its own: its
-/// other figures and its tables, folded.
+/// Appends the figures that show what differs and one table of everything, then every metric in a section of its own:
+/// its other figures and its tables, folded.
 fn append_results(document: &mut Document, summary: &Summary) {
     document.section("Results").figures(summary.lead_figures().iter().cloned());
     document.tables([summary.overview()]);
