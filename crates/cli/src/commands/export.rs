@@ -28,7 +28,6 @@ Examples:
   sidestep export runs/office --to rosbag           odometry and scans for ROS 2
   sidestep export runs/reacher --to trajectory      motions of arms for ROS 2
   sidestep export runs/office --to gif --from 1000 --until 2000
-  sidestep export runs/office --to png --from 1234  one moment
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
   sidestep export runs/office --to page --agents 1  one file for any browser
 
