@@ -12,6 +12,7 @@ mod metrics;
 mod run;
 mod series;
 mod sweep;
+mod sweep_series;
 mod tables;
 mod text;
 

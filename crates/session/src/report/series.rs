@@ -75,8 +75,8 @@ fn figure(name: &str, cycles: &[u64], values: &ColumnValues, meanings: &[MetricI
     let rows = (0..cycles.len()).filter(|row| row % step == 0 || *row == last);
     let point = |row: usize| Point::new(cycles[row] as f64, values.number(row).unwrap_or(f64::NAN));
     // A meaning that only repeats the words says nothing more.
-    let is_told = meaning.is_empty() || meaning == words;
-    let note = if is_told { String::new() } else { format!("{meaning}.") };
+    let says_more = !meaning.is_empty() && meaning != words;
+    let note = if says_more { format!("{meaning}.") } else { String::new() };
     Figure {
         title: capitalize(&words),
         note: capitalize(&note),

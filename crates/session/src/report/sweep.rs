@@ -1,5 +1,6 @@
 //! The folder of a sweep as a document: its runs, their results, and the precision of these.
 
+use super::sweep_series;
 use super::text::{format_count, format_duration};
 use crate::sweep::{FinishedRuns, Folder, read_finished, run_picture};
 use crate::{Error, Watcher};
@@ -27,21 +28,24 @@ pub(super) fn document(
     folder: &Folder,
     watcher: &dyn Watcher,
 ) -> Result<Document, Error> {
-    let FinishedRuns { table, is_complete, .. } = read_finished(folder)?;
+    let finished = read_finished(folder)?;
+    let FinishedRuns { table, is_complete, .. } = &finished;
     // Its text is shown.
     folder.check_variant(0)?;
     let plan = folder.plan();
-    let summary = plan.summary(worlds, &table)?;
-    let mut document = Document::new(name(plan), lead(plan, &table));
+    let summary = plan.summary(worlds, table)?;
+    let mut document = Document::new(name(plan), lead(plan, table));
     if !is_complete {
-        document.warning(unfinished(folder, &table));
+        document.warning(unfinished(folder, table));
     }
     append_results(&mut document, &summary);
-    append_failures(&mut document, plan, &table);
-    let pictures = pictures(worlds, folder, &table, watcher)?;
+    let meanings = worlds.find(&plan.world).map_or(&[][..], |world| world.metric_infos());
+    sweep_series::append(&mut document, plan, &finished, meanings);
+    append_failures(&mut document, plan, table);
+    let pictures = pictures(worlds, folder, table, watcher)?;
     append_pictures(&mut document, pictures);
     append_methods(&mut document, &summary);
-    append_plan(&mut document, folder, &table);
+    append_plan(&mut document, folder, table);
     Ok(document)
 }
 
