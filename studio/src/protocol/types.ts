@@ -1048,7 +1048,7 @@ tables: number,
  */
 source: number,
 /**
- * The part with the reply to the request for all samples of metrics.
+ * The part with the reply to the request for all rows of metrics.
  */
 metrics: number,
 /**

@@ -39,7 +39,7 @@ pub struct ReplayRun {
     pub tables: u32,
     /// The part with the reply to the request for the scenario.
     pub source: u32,
-    /// The part with the reply to the request for all samples of metrics.
+    /// The part with the reply to the request for all rows of metrics.
     pub metrics: u32,
     /// The parts with frames, in their order.
     pub chunks: Vec<ReplayChunk>,
