@@ -25,7 +25,7 @@ use std::ops::Range;
 
 mod foresight;
 
-pub(super) use foresight::NextMotions;
+pub(super) use foresight::{NextMotions, ROUNDING_M, first_cone_rod};
 
 /// Distance that is kept beyond the one needed, meters: far more than rounding.
 const MARGIN_M: f64 = 1e-8;

@@ -35,21 +35,31 @@ pub(super) fn pull_chain_by_connector<const D: usize>(
 }
 
 /// Moves connector 0, and of the first `connectors` all that must follow. The rest of the chain follows later, from
-/// where the last of them goes.
+/// where the last of them goes. Returns the last connector that its master pushed away by more than `tolerance_m`.
 pub(super) fn pull_first_connectors<const D: usize>(
     chain: &mut Chain<D>,
-    connectors: usize,
+    (connectors, tolerance_m): (usize, f64),
     to: Point<D>,
     tally: &mut MotionEffects,
-) {
+) -> Option<usize> {
     let min_move_m = chain.min_move_m();
     let (points, rods) = chain.parts_mut();
     let mut sweep = ObstacleFreePropagation::start(ChainDirection::Up, 0, points[0], to);
     points[0] = to;
-    while sweep.master + 1 < connectors && sweep.advance::<false>(points, rods, min_move_m) {}
+    let mut last_pushed = None;
+    while sweep.master + 1 < connectors {
+        let slave = sweep.master + 1;
+        if distance(sweep.mn, points[slave]) < rods[sweep.master].min_m - tolerance_m {
+            last_pushed = Some(slave);
+        }
+        if !sweep.advance::<false>(points, rods, min_move_m) {
+            break;
+        }
+    }
     tally.record_touched_range(0..sweep.master + 1);
     tally.changed += 1 + sweep.changed;
     tally.record_slave_move(sweep.longest2.sqrt());
+    last_pushed
 }
 
 /// Makes both sweeps. `NEARLY` is a parameter of the type because the loop is too short to test the

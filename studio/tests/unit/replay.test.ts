@@ -140,7 +140,7 @@ function replayText(): string {
     { inspection: { body: robot(3), cycle: 20, title: "robot 3", sections: [], marks: [] }, scans: [] },
   ];
   const names = [{ key: "trips", label: "trips", unit: "" }];
-  const metrics = { is: "metrics", names, first: 0, thinned: 0, cycles: [0, 20, 30], values: [[0, 1, 2]] };
+  const metrics = { is: "metrics", names, first: 0, present: null, cycles: [0, 20, 30], values: [[0, 1, 2]] };
   const file: ReplayFile = {
     version: VERSION,
     program: "sidestep",

@@ -121,10 +121,13 @@ struct Print {
 pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Failure> {
     let files = report_files(args)?;
     // Wrong options are refused before a large folder is read.
-    let figures = args.print.figures()?;
+    let mut figures = args.print.figures()?;
     files.begin()?;
     let document = document(worlds(), &args.folder, &ConsoleWatcher::new(console))?;
-    figures.iter().try_for_each(|print| check_labels(&print.style, &document))?;
+    if let Some(print) = &mut figures {
+        split_at_known_labels(&mut print.style.labels, &document);
+        check_labels(&print.style, &document)?;
+    }
     let mut listed = files.begin()?;
     let figures =
         figures.map(|print| args.print.add(&print, &document, &files, &mut listed)).transpose()?;
@@ -232,6 +235,19 @@ impl PrintArgs {
     }
 }
 
+/// Takes `n=4=four` apart where a figure has the words `n=4`, rather than at the first sign.
+fn split_at_known_labels(labels: &mut [(String, String)], document: &Document) {
+    let known = PrintStyle::document_labels(document);
+    for label in labels {
+        let text = format!("{}={}", label.0, label.1);
+        let splits = text.match_indices('=').map(|(at, _)| (&text[..at], &text[at + 1..]));
+        // The longest words: those of a variant may begin as those of another one do.
+        if let Some((from, to)) = splits.filter(|(from, _)| known.contains(from)).last() {
+            *label = (from.to_string(), to.to_string());
+        }
+    }
+}
+
 /// Checks that each label occurs in some figure, before anything is written.
 ///
 /// # Errors
@@ -264,7 +280,7 @@ fn parse_size_mm(text: &str) -> Result<[f64; 2], InputError> {
     }
 }
 
-/// Parses `WORDS=OTHERS`.
+/// Parses `WORDS=OTHERS`, for now at the first sign.
 fn parse_label(text: &str) -> Result<(String, String), InputError> {
     let parts = text.split_once('=').filter(|(from, _)| !from.is_empty());
     let (from, to) = parts.ok_or_else(|| {

@@ -13,7 +13,7 @@ use sidestep_draw::{DARK_COLORS, Spot};
 const MAX_TABLE_ROWS: usize = 200;
 
 pub(super) fn figure(figure: &Figure, id: &str, drawn: Option<&PagePicture>) -> Markup {
-    let chart = html! { @if let Some(drawn) = drawn { (chart(figure, drawn)) } };
+    let chart = html! { @if let Some(drawn) = drawn { (chart(figure, drawn, id)) } };
     let class = if has_full_width(figure) { "plot full" } else { "plot" };
     html! {
         figure class=(class) id=(id) {
@@ -33,14 +33,14 @@ fn has_full_width(figure: &Figure) -> bool {
 }
 
 /// Returns the drawing of a figure, what its marks say where the pointer is, and its numbers.
-fn chart(figure: &Figure, drawn: &PagePicture) -> Markup {
+fn chart(figure: &Figure, drawn: &PagePicture, id: &str) -> Markup {
     let spots: Vec<_> = drawn.spots.iter().map(spot_json).collect();
     let data = json!({ "figure": figure, "spots": spots });
     html! {
         // What scrolls on a telephone must be reached by keyboard, too.
         @let is_full = has_full_width(figure);
         div .canvas tabindex=[is_full.then_some("0")] role=[is_full.then_some("region")]
-            aria-label=[is_full.then(|| format!("Figure: {}", figure.title))] { (inline_svg(&drawn.file.svg, &alt_text(figure))) }
+            aria-label=[is_full.then(|| format!("Figure: {}", figure.title))] { (inline_svg(&drawn.file.svg, &alt_text(figure), id)) }
         script type="application/json" { (PreEscaped(safe_json(&data))) }
         @if !figure.note.is_empty() { p .note { (figure.note) } }
         @if let Some(numbers) = numbers_table(figure) {
@@ -71,15 +71,19 @@ fn spot_json(spot: &Spot) -> serde_json::Value {
 }
 
 /// Returns a drawing as a part of the page. Its own title would be shown beside the values of its marks, so it becomes
-/// the name of the drawing.
-fn inline_svg(svg: &str, alt: &str) -> Markup {
+/// the name of the drawing. Names of clips are those of the figure alone: of two equal names a browser takes the first,
+/// which clips nothing where its figure is folded.
+fn inline_svg(svg: &str, alt: &str, id: &str) -> Markup {
     // Escaped by maud.
     let alt = html! { (alt) }.into_string();
     let (head, rest) = svg.split_once("<title>").unwrap_or((svg, ""));
     let body = rest.split_once("</title>").map_or(rest, |(_, body)| body);
     let head = head.replacen("<svg ", &format!("<svg class=\"chart\" aria-label=\"{alt}\" "), 1);
+    let drawing = format!("{head}{body}")
+        .replace("id=\"clip_", &format!("id=\"{id}_clip_"))
+        .replace("url(#clip_", &format!("url(#{id}_clip_"));
     // No line ends are needed between elements.
-    html! { (PreEscaped(format!("{head}{body}").replace(">\n", ">"))) }
+    html! { (PreEscaped(drawing.replace(">\n", ">"))) }
 }
 
 pub(super) fn picture(picture: &Picture, id: &str) -> Markup {

@@ -4,13 +4,19 @@
 //! the master has moved. So far parts stay apart as long as their gaps are longer than all these motions.
 //!
 //! Parts near each other along the chain stay apart as long as their rods point forward along one direction. Where two
-//! rods in a row enclose a right angle at most, the second follows the first as on a tow: it turns toward the first,
-//! never past it, by at most the fraction `step / length` of the angle between them. Angles to a direction are convex
-//! along such a turn, so rods within a cone stay within it, but for what comes down the chain from rods outside of it.
-//! That fades with every rod ([`fade_rods`]), and a stretch whose rods, and so many before them, are within a narrow
-//! cone stays within a slightly wider one.
+//! rods in a row enclose a right angle at most and the first is pulled, so is the second, as on a tow: it turns toward
+//! the first, never past it, by at most the fraction `step / length` of the angle between them. Angles to a direction
+//! are convex along such a turn, so rods within a cone stay within it, but for what comes down the chain from rods
+//! outside of it. That fades with every rod ([`fade_rods`]), and a stretch whose rods, and so many before them, are
+//! within a narrow cone stays within a slightly wider one.
+//!
+//! Rods that are pushed turn away from each other, and a push goes far down a straight chain. So a motion counts as
+//! foreseen only if nothing is pushed from the start of the cone on, which is among the first rods
+//! ([`first_cone_rod`]); then all beyond are pulled, because the angles between them are small.
 
-use super::{BLOCK, MARGIN_M, STRIDE, SeparationBounds, block_rods, needed_gap_m, stretches};
+use super::{
+    BLOCK, MARGIN_M, STRETCH, STRIDE, SeparationBounds, block_rods, needed_gap_m, stretches,
+};
 use crate::chain::Chain;
 use crate::geometry::{Point, dot, sub};
 use std::f64::consts::FRAC_PI_2;
@@ -28,11 +34,13 @@ const MAX_FADE_RAD: f64 = 0.008_726_646_259_971_648;
 const SPREAD_COS: f64 = 0.754_709_580_222_771_9;
 /// Rods before a stretch that may have to be in its cone: as many as leave one block before the second stretch's end.
 const MAX_FADE_RODS: usize = 48;
-/// Greatest length of a motion in lengths of the least rod: a rod turns by up to twice that in a motion, in rad.
+/// Greatest length of a motion in lengths of the least rod, which is the sine of the angle by which a rod turns at most.
 const MAX_STEP_RATIO: f64 = 0.5;
+/// Least length of a rod, meters: shorter ones would turn by rounding.
+const MIN_ROD_M: f64 = 1e-3;
 /// Amount by which a rod may be outside its limits, meters, where it counts as within them: rounding of coordinates up
 /// to 1e6 m.
-const ROUNDING_M: f64 = 1e-9;
+pub(in super::super) const ROUNDING_M: f64 = 1e-9;
 
 /// The next motions of connector 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +70,7 @@ impl<const D: usize> SeparationBounds<D> {
         let rods = chain.rods().len();
         let min_rod_m = chain.min_rod_m();
         let spread_m = SPREAD_COS * (min_rod_m - ROUNDING_M);
-        if spread_m < chain.neighbor_separation_m() + MARGIN_M {
+        if min_rod_m < MIN_ROD_M || spread_m < chain.neighbor_separation_m() + MARGIN_M {
             return None;
         }
         let fade = fade_rods(motions.travel_m() / min_rod_m, motions.count)?;
@@ -125,6 +133,12 @@ fn is_in_cone<const D: usize>(chain: &Chain<D>, rods: Range<usize>) -> bool {
             & (length2 <= longest_m * longest_m)
     };
     points.windows(2).zip(&chain.rods()[rods]).all(is_rod_in_cone)
+}
+
+/// Returns the first rod that may have to be in the cone of a stretch which ends beyond the first rods.
+pub(in super::super) fn first_cone_rod(first_rods: usize) -> usize {
+    let first_start = first_rods + STRIDE - STRETCH;
+    first_start.saturating_sub(MAX_FADE_RODS)
 }
 
 /// Returns the number of rods after which what comes down the chain has faded, if connector 0 moves by at most

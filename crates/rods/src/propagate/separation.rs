@@ -72,8 +72,8 @@ impl<const D: usize> Propagator<D> {
     }
 
     /// Makes all of a request in one motion, as in the open, if no part comes near another in it: one long step is then
-    /// as safe as many short ones, and has the bits that it has without an own body. Whether it does follows from the chain and the request alone. Returns whether it was
-    /// made.
+    /// as safe as many short ones, and has the bits that it has without an own body. Whether it does follows from the
+    /// chain and the request alone. Returns whether it was made.
     pub(super) fn try_whole_motion(
         &mut self,
         chain: &mut Chain<D>,

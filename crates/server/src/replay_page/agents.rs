@@ -108,14 +108,21 @@ impl InspectionRequest {
         }
         let agents: Vec<&Body> = first.bodies.iter().filter(|body| body.kind.is_agent()).collect();
         for agent in &self.agents {
-            // Airplanes may come later: only a number that is beyond all is certainly wrong.
-            let is_there = agents.iter().any(|body| agent.matches(body));
-            let highest = agents.iter().map(|body| body.number).max().unwrap_or(0);
-            if !is_there && agent.number > highest {
-                let cause = format!("there is no such agent: their numbers are 0 to {highest}");
-                let remedy = "give numbers as the list of agents of the studio has them";
-                return Err(InputError::new(format!("--agents {agent}"), cause, remedy));
+            // Airplanes may come later: only a number that is beyond all is certainly wrong, or a part of one that is
+            // there without it.
+            if agents.iter().any(|body| agent.matches(body)) {
+                continue;
             }
+            let highest = agents.iter().map(|body| body.number).max().unwrap_or(0);
+            let cause = if agent.number > highest {
+                format!("there is no such agent: their numbers are 0 to {highest}")
+            } else if agents.iter().any(|body| body.number == agent.number) {
+                "there is such an agent, but it has no such part".to_string()
+            } else {
+                continue;
+            };
+            let remedy = "give numbers as the list of agents of the studio has them";
+            return Err(InputError::new(format!("--agents {agent}"), cause, remedy));
         }
         Ok(())
     }
@@ -179,6 +186,7 @@ mod tests {
         let check = |request: InspectionRequest| request.check(&frame(0), (0, 100));
         let told = |request| check(request).expect_err("refused").to_string();
         assert!(told(request(&["4"], None)).contains("their numbers are 0 to 3"));
+        assert!(told(request(&["3/5"], None)).contains("has no such part"));
         assert!(told(request(&[], Some("101:200"))).contains("cycles 0 to 100"));
         assert!(check(request(&["3"], Some("100:200"))).is_ok());
         assert!("1:x".parse::<CycleWindow>().is_err() && "9:2".parse::<CycleWindow>().is_err());

@@ -203,7 +203,7 @@ fn banner((from, until): (Cycle, Cycle), every: Cycle, is_confirmed: bool) -> St
     let cycles = format!("cycles {} to {}", group_thousands(from), group_thousands(until));
     let frames = match every {
         1 => "every cycle is here".to_string(),
-        _ => format!("every {}th cycle is here", group_thousands(every)),
+        _ => format!("one of {} cycles is here", group_thousands(every)),
     };
     let end = if is_confirmed { "; its end has the recorded digest" } else { "" };
     format!("A recorded run, {cycles}: {frames}, nothing is computed{end}.")

@@ -73,14 +73,16 @@ fn figure(name: &str, cycles: &[u64], values: &ColumnValues, meanings: &[MetricI
     let step = cycles.len().div_ceil(MAX_POINTS).max(1);
     let last = cycles.len().saturating_sub(1);
     let rows = (0..cycles.len()).filter(|row| row % step == 0 || *row == last);
-    let point = |row: usize| Point::new(cycles[row] as f64, values.number(row).unwrap_or(f64::NAN));
+    // The number of cycles done, as in charts and sweeps; the table has the number of the last cycle.
+    let done = |row: usize| (cycles[row] + 1) as f64;
+    let point = |row: usize| Point::new(done(row), values.number(row).unwrap_or(f64::NAN));
     // A meaning that only repeats the words says nothing more.
     let says_more = !meaning.is_empty() && meaning != words;
     let note = if says_more { format!("{meaning}.") } else { String::new() };
     Figure {
         title: capitalize(&words),
         note: capitalize(&note),
-        x_label: "cycle".into(),
+        x_label: "cycles done".into(),
         y_label: label,
         kind: FigureKind::Bands,
         series: vec![Series { name: String::new(), points: rows.map(point).collect() }],
@@ -100,7 +102,7 @@ mod tests {
         let figure = figure("gap_m", &cycles, &values, &[]);
         let points = &figure.series[0].points;
         assert!(points.len() <= MAX_POINTS + 1);
-        assert_eq!(points.last().map(|p| (p.x, p.y)), Some((1000.0, 1000.0)));
+        assert_eq!(points.last().map(|p| (p.x, p.y)), Some((1001.0, 1000.0)));
         assert_eq!(figure.y_label, "gap (m)");
         assert!(
             changes(&values)

@@ -172,7 +172,8 @@ fn check_metrics(
     compiled: &dyn CompiledScenario,
 ) -> Result<(), InputError> {
     let of_until = sweep.until.iter().flat_map(|until| &until.metrics);
-    let mut wanted = sweep.metrics.iter().chain(of_until).peekable();
+    let aims = sweep.better.iter().map(|aim| &aim.metric);
+    let mut wanted = sweep.metrics.iter().chain(of_until).chain(aims).peekable();
     if wanted.peek().is_none() {
         return Ok(());
     }

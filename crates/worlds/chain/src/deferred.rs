@@ -1,9 +1,10 @@
 //! Motions of an initiator that the rest of its chain has yet to follow, with their measures.
 //!
 //! Where nothing can object, `sidestep_rods` lets a chain follow several motions at once, in the same bits
-//! as one after the other and much faster; a chain with a solid body but for its first rods. The chain follows once enough motions are deferred; one that is
-//! read before is copied, and the copy follows. Every bit and every measure is as if it had followed each at once, so it
-//! does not matter when it is read.
+//! as one after the other and much faster; a chain with a solid body but for its first rods.
+//!
+//! The chain follows once enough motions are deferred; one that is read before is copied, and the copy follows. Every bit
+//! and every measure is as if it had followed each at once, so it does not matter when it is read.
 
 use super::metrics::ChainTally;
 use sidestep_rods::geometry::Point;

@@ -127,7 +127,7 @@ impl EscapePlan {
         let now = self.exit_direction();
         let at_risk = connectors_at_risk(input, solver);
         let group = group_to_save(&at_risk, now.map(|exit| exit.obstacle));
-        let around = roll_out_connectors(group, input.chain.points().len());
+        let around = rollout_connectors(group, input.chain.points().len());
         let Some(rollout) = Rollout::from_connector_range(rules, input, around) else {
             return false;
         };
@@ -192,7 +192,7 @@ fn exit_directions<const D: usize>(through: Point<D>, velocity_m_s: Point<D>) ->
 }
 
 /// Returns the connectors that rollouts include to save some: also those to either side.
-fn roll_out_connectors(group: &[ConnectorAtRisk], connectors: usize) -> RangeInclusive<usize> {
+fn rollout_connectors(group: &[ConnectorAtRisk], connectors: usize) -> RangeInclusive<usize> {
     // Without any in danger the chain's start stands for it.
     let from = group.first().map_or(0, |at_risk| at_risk.k);
     let to = group.last().map_or(0, |at_risk| at_risk.k);
