@@ -182,7 +182,9 @@ impl Figure {
                 let [low, high] = ends(point.interval);
                 let [x_low, x_high] = ends(point.x_interval);
                 let n = point.n.map_or(String::new(), |n| n.to_string());
-                let (name, x, y) = (csv_cell(&series.name), csv_cell(x), number(point.y));
+                let name = csv_cell(&series.name);
+                let x = csv_cell(x);
+                let y = number(point.y);
                 text += &format!("{name},{x},{y},{low},{high},{x_low},{x_high},{n}\n");
             }
         }

@@ -242,7 +242,7 @@ fn split_at_known_labels(labels: &mut [(String, String)], document: &Document) {
         let text = format!("{}={}", label.0, label.1);
         let splits = text.match_indices('=').map(|(at, _)| (&text[..at], &text[at + 1..]));
         // The longest words: those of a variant may begin as those of another one do.
-        if let Some((from, to)) = splits.filter(|(from, _)| known.contains(from)).last() {
+        if let Some((from, to)) = splits.rev().find(|(from, _)| known.contains(from)) {
             *label = (from.to_string(), to.to_string());
         }
     }

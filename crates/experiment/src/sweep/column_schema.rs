@@ -3,7 +3,7 @@
 //! A table that is written block by block needs them before its first block: a metric may appear, or turn out to be
 //! no whole number, in the last run.
 
-use super::table::Role;
+use super::table::{CYCLES, Role};
 use super::trial::Outcome;
 use serde_json::Value;
 use sidestep_kernel::ports::{ColumnType, ColumnValues};
@@ -11,8 +11,6 @@ use std::collections::BTreeMap;
 
 /// Name of the column of reasons why runs failed; it exists only if one did.
 pub(super) const FAILURE: &str = "failure";
-/// Name of the column of cycles done; failed runs have no value in it.
-pub(super) const CYCLES: &str = "cycles_run";
 
 /// The columns of a table of runs: results of runs and the times that they took, with the types that hold all values.
 #[derive(Debug, Clone, Default)]

@@ -1,12 +1,11 @@
 //! Outcomes -> a table of runs, the same for any order of arrival.
 
 use super::column_schema::{
-    CYCLES, ColumnOrder, ColumnSchema, FAILURE, common_type, for_each_field, type_of, value_text,
-    widened,
+    ColumnOrder, ColumnSchema, FAILURE, common_type, for_each_field, type_of, value_text, widened,
 };
 use super::plan::{Plan, Shard, Trial};
 use super::seeds::PilotRuns;
-use super::table::{Role, RunColumn, RunTable};
+use super::table::{CYCLES, Role, RunColumn, RunTable};
 use super::trial::Outcome;
 use serde_json::{Map, Value};
 use sidestep_kernel::InputError;

@@ -4,7 +4,7 @@
 //! runs they are columns with the role [`Role::Series`], which [`RunTable::split_series`] turns into a table of their
 //! own, a row for each run and cycle.
 
-use super::table::{Role, RunColumn, RunTable};
+use super::table::{CYCLES, Role, RunColumn, RunTable};
 use serde_json::{Map, Value};
 use sidestep_kernel::ports::ColumnValues;
 use sidestep_kernel::series::SeriesInterval;
@@ -218,7 +218,7 @@ impl Variants {
             let trial = number(runs, Role::Trial, run);
             let rows = trial.and_then(|trial| of_trial.remove(&trial));
             if let (Some(by_cycle), Some(variant)) = (rows, number(runs, Role::Variant, run)) {
-                let end = runs.column(super::column_schema::CYCLES);
+                let end = runs.column(CYCLES);
                 let end = end.and_then(|column| column.values.number(run)).unwrap_or(0.0) as Cycle;
                 variants.entry(variant as u32).or_default().push(RunRows { run, end, by_cycle });
             }

@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::ColumnWithRole;
 
+/// Name of the column of cycles done; failed runs have no value in it.
+pub(super) const CYCLES: &str = "cycles_run";
+
 /// The role of a column in a table of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -26,7 +26,9 @@ impl FrameColumns {
         };
         let count = |at: usize| word(at) as usize;
         let d = usize::from(bytes[6]);
-        let (bodies, lines, points) = (count(32), count(36), count(40));
+        let bodies = count(32);
+        let lines = count(36);
+        let points = count(40);
         let mut at = HEADER_BYTES;
         let mut words = |n: usize| {
             let found: Vec<u32> = (0..n).map(|k| word(at + 4 * k)).collect();

@@ -202,7 +202,9 @@ impl<'a> ReplayCollector<'a> {
             let Some((first, last)) = entries.first().zip(entries.last()) else {
                 return Ok((spans, left_out));
             };
-            let (from, until, count) = (first.cycle, last.cycle, entries.len() as u32);
+            let from = first.cycle;
+            let until = last.cycle;
+            let count = entries.len() as u32;
             let part = self.parts.push_json(&event_columns(entries))?;
             spans.push(ReplaySpan { part, from, until, count });
             done += count;
