@@ -58,14 +58,17 @@ pub(super) struct ProvenMotion {
     /// Whether the proof is to hold for parts that move one after the other as well, as reactions are checked: only
     /// then would these checks have made the same motion.
     pub(super) in_turn: bool,
+    /// Whether it is a whole request, which is proven also where parts are near and each pair keeps its distance; a
+    /// sub-step is to be what reactions would make of it, and they look at one part after the other.
+    pub(super) is_whole: bool,
 }
 
 /// The gap that rods are to have from parts that are not near them along the chain.
 #[derive(Debug, Clone, Copy)]
 struct NeededGap {
     needed_m: f64,
-    /// See [`ProvenMotion::in_turn`].
-    in_turn: bool,
+    /// Whether nearer parts may be looked at pair by pair, see [`ProvenMotion::is_whole`].
+    by_pairs: bool,
 }
 
 /// Gaps of elements (rods, or blocks of them) from all others, with the travel since.
@@ -209,7 +212,7 @@ impl<const D: usize> SeparationBounds<D> {
     ) -> bool {
         self.add_travel(motion.travel_m);
         let needed_m = needed_gap_m(motion.travel_m);
-        let needs = NeededGap { needed_m, in_turn: motion.in_turn };
+        let needs = NeededGap { needed_m, by_pairs: motion.is_whole };
         let rods = chain.rods().len();
         for stretch in stretches(rods).take_while(|stretch| stretch.end <= end) {
             let has_moved = motion.moved.start <= stretch.end && stretch.start < motion.moved.end;
@@ -302,15 +305,15 @@ impl<const D: usize> SeparationBounds<D> {
     /// Returns whether some rods and their connectors have the gap that is needed to all parts that are not near them
     /// along the chain, or keep their distances from each of these.
     fn are_rods_apart(&mut self, chain: &Chain<D>, rods: Range<usize>, needs: NeededGap) -> bool {
-        let NeededGap { needed_m, in_turn } = needs;
+        let NeededGap { needed_m, by_pairs } = needs;
         for rod in rods {
             if self.rods.until_m[rod] - self.odometer_m >= needed_m + SLACK_M {
                 continue;
             }
             let gap_m = self.measure_rod_gap_m(chain, rod, needed_m);
             self.rods.until_m[rod] = self.odometer_m + gap_m;
-            // Paths that are clear for parts which move at once may not be for those that move one after the other.
-            if gap_m < needed_m && (in_turn || !self.is_rod_apart(chain, rod, needed_m)) {
+            let is_near = gap_m < needed_m;
+            if is_near && !(by_pairs && self.is_rod_apart(chain, rod, needed_m)) {
                 return false;
             }
         }

@@ -82,7 +82,8 @@ impl<const D: usize> DeferredSolidMotions<D> {
             && last_pushed.is_none_or(|last| last < first_cone_rod(first_rods));
         let moved = 0..effects.to;
         self.bounds.add_lag(first_rods, travel_m);
-        let motion = ProvenMotion { moved: moved.clone(), travel_m, in_turn: false };
+        let motion =
+            ProvenMotion { moved: moved.clone(), travel_m, in_turn: false, is_whole: true };
         if !self.bounds.allows_first(chain, &motion, first_rods) || !is_foreseen {
             let before = &self.bounds.recorded_points()[moved.clone()];
             chain.points_mut()[moved].copy_from_slice(before);

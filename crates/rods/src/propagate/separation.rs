@@ -107,19 +107,24 @@ impl<const D: usize> Propagator<D> {
         let head_m = distance(chain.points()[driven.first], driven.to[0]);
         open::pull_chain_by_connector(chain, driven.first, driven.to[0], stays, &mut tally);
         let travel_m = head_m.max(tally.max_slave_step_m);
-        self.prove_or_revert(chain, &tally, travel_m).then_some(tally)
+        let motion = ProvenMotion {
+            moved: tally.from..tally.to,
+            travel_m,
+            in_turn: false,
+            is_whole: stays == StayRule::Exactly,
+        };
+        self.prove_or_revert(chain, &tally, motion).then_some(tally)
     }
 
-    /// Returns whether a motion from the recorded places, in which connectors moved by at most
-    /// `travel_m`, is proven to be allowed; otherwise it is taken back.
+    /// Returns whether a motion from the recorded places is proven to be allowed; otherwise it is taken back.
     fn prove_or_revert(
         &mut self,
         chain: &mut Chain<D>,
         tally: &MotionEffects,
-        travel_m: f64,
+        motion: ProvenMotion,
     ) -> bool {
-        let run = tally.from..tally.to;
-        let motion = ProvenMotion { moved: run.clone(), travel_m, in_turn: false };
+        let run = motion.moved.clone();
+        let travel_m = motion.travel_m;
         let holds = tally.max_slave_step_m <= self.rules.slave_step_max_m
             && self.motion_bounds.allows(chain, &motion);
         if !holds {
@@ -166,7 +171,7 @@ impl<const D: usize> Propagator<D> {
         let travel_m = moves.map(|(new, old)| distance(*new, *old)).fold(0.0, f64::max);
         // The bounds measure a chain, so it is moved for them and put back.
         chain.points_mut()[run.clone()].copy_from_slice(self.tentative.positions());
-        let motion = ProvenMotion { moved: run.clone(), travel_m, in_turn: true };
+        let motion = ProvenMotion { moved: run.clone(), travel_m, in_turn: true, is_whole: false };
         let are_separated = self.motion_bounds.allows(chain, &motion);
         chain.points_mut()[run.clone()].copy_from_slice(&self.motion_bounds.recorded_points()[run]);
         if !are_separated {

@@ -2,7 +2,7 @@
 
 use crate::exports::wanted;
 use crate::support::{TestFolder, WORLDS};
-use sidestep_session::export::{ExportRequest, Format, export};
+use sidestep_session::export::{Format, export};
 use sidestep_session::sweep::{Folder, create};
 use sidestep_session::{NoWatcher, OutputPaths, RecordedRun};
 use std::os::unix::fs::symlink;
