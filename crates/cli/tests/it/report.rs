@@ -15,8 +15,8 @@ const CHAIN: &str = "format = 1\nworld = \"chain\"\nname = \"Wanderer\"\nseed = 
                      radius_m = 0.05\n\
                      [[chains.tasks]]\nkind = \"wander\"\nspeed_m_s = 0.6\n";
 
-/// Largest size of a page in bytes that is fit to be sent around.
-const MAX_PAGE_BYTES: usize = 400_000;
+/// Largest size of a page in bytes that is fit to be sent around; half of it are drawings of metrics over time.
+const MAX_PAGE_BYTES: usize = 800_000;
 
 /// Returns a place with a recorded run of each world and its report.
 fn reported(scenario: &str) -> TestFolder {

@@ -82,7 +82,7 @@ fn figure(name: &str, cycles: &[u64], values: &ColumnValues, meanings: &[MetricI
     Figure {
         title: capitalize(&words),
         note: capitalize(&note),
-        x_label: "cycles done".into(),
+        x_label: "cycle".into(),
         y_label: label,
         kind: FigureKind::Bands,
         series: vec![Series { name: String::new(), points: rows.map(point).collect() }],

@@ -73,7 +73,7 @@ fn figure<'a>(
     let label = unit.map_or_else(|| words.clone(), |unit| format!("{words} ({unit})"));
     Some(Figure {
         title: format!("{} over time", capitalize(&words)),
-        x_label: "cycles done".into(),
+        x_label: "cycle".into(),
         y_label: label,
         kind: FigureKind::Bands,
         series,
