@@ -8,6 +8,7 @@
 use super::candidates::guide_line_slave_position;
 use super::chain::{Chain, Rod};
 use super::geometry::{Point, distance, dot, sub};
+use super::motion_bounds::ROUNDING_M;
 use super::motion_context::is_length_allowed;
 use super::pass::{ChainDirection, MotionEffects};
 
@@ -35,10 +36,10 @@ pub(super) fn pull_chain_by_connector<const D: usize>(
 }
 
 /// Moves connector 0, and of the first `connectors` all that must follow. The rest of the chain follows later, from
-/// where the last of them goes. Returns the last connector that its master pushed away by more than `tolerance_m`.
+/// where the last of them goes. Returns the last connector that its master pushed away by more than rounding.
 pub(super) fn pull_first_connectors<const D: usize>(
     chain: &mut Chain<D>,
-    (connectors, tolerance_m): (usize, f64),
+    connectors: usize,
     to: Point<D>,
     tally: &mut MotionEffects,
 ) -> Option<usize> {
@@ -49,7 +50,7 @@ pub(super) fn pull_first_connectors<const D: usize>(
     let mut last_pushed = None;
     while sweep.master + 1 < connectors {
         let slave = sweep.master + 1;
-        if distance(sweep.mn, points[slave]) < rods[sweep.master].min_m - tolerance_m {
+        if distance(sweep.mn, points[slave]) < rods[sweep.master].min_m - ROUNDING_M {
             last_pushed = Some(slave);
         }
         if !sweep.advance::<false>(points, rods, min_move_m) {

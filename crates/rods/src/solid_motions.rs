@@ -7,9 +7,7 @@
 
 use super::chain::Chain;
 use super::geometry::{Point, distance};
-use super::motion_bounds::{
-    NextMotions, ProvenMotion, ROUNDING_M, SeparationBounds, first_cone_rod,
-};
+use super::motion_bounds::{NextMotions, ProvenMotion, SeparationBounds, first_cone_rod};
 use super::open;
 use super::pass::MotionEffects;
 use super::propagate::SeparationProofSchedule;
@@ -75,8 +73,7 @@ impl<const D: usize> DeferredSolidMotions<D> {
         let travel_m = motions.travel_m();
         let was = chain.points()[first_rods];
         let mut effects = MotionEffects::start(0);
-        let first = (first_rods + 1, ROUNDING_M);
-        let last_pushed = open::pull_first_connectors(chain, first, to, &mut effects);
+        let last_pushed = open::pull_first_connectors(chain, first_rods + 1, to, &mut effects);
         // The proof takes all rods from the cone's start on as pulled, and no connector as faster than connector 0.
         let is_foreseen = effects.max_slave_step_m <= travel_m
             && last_pushed.is_none_or(|last| last < first_cone_rod(first_rods));
@@ -84,7 +81,7 @@ impl<const D: usize> DeferredSolidMotions<D> {
         self.bounds.add_lag(first_rods, travel_m);
         let motion =
             ProvenMotion { moved: moved.clone(), travel_m, in_turn: false, is_whole: true };
-        if !self.bounds.allows_first(chain, &motion, first_rods) || !is_foreseen {
+        if !is_foreseen || !self.bounds.allows_first(chain, &motion, first_rods) {
             let before = &self.bounds.recorded_points()[moved.clone()];
             chain.points_mut()[moved].copy_from_slice(before);
             self.bounds.revert(travel_m);
@@ -203,6 +200,7 @@ mod tests {
         }
         deferred.apply_to_chain(&mut later);
         assert_eq!(later.points(), one_by_one.points());
+        assert_eq!(changed[0], changed[1]);
         assert_eq!(longest_m[0].to_bits(), longest_m[1].to_bits());
         n_deferred
     }

@@ -32,7 +32,8 @@ const MAX_FADE_RAD: f64 = 0.008_726_646_259_971_648;
 /// Cosine of twice the angle of both, 41 degrees: the greatest angle between two rods of a stretch, and so between one
 /// of them and the line from end to end.
 const SPREAD_COS: f64 = 0.754_709_580_222_771_9;
-/// Rods before a stretch that may have to be in its cone: as many as leave one block before the second stretch's end.
+/// Rods before a stretch that may have to be in its cone: as many as lie before the second stretch. The first one has
+/// none.
 const MAX_FADE_RODS: usize = 48;
 /// Greatest length of a motion in lengths of the least rod, which is the sine of the angle by which a rod turns at most.
 const MAX_STEP_RATIO: f64 = 0.5;
@@ -89,6 +90,7 @@ impl<const D: usize> SeparationBounds<D> {
         // Both parts of a pair travel, and the boxes of blocks come nearer along each axis.
         let approach_m = 2.0 * motions.count as f64 * motions.travel_m() * (D as f64).sqrt();
         let needed_m = needed_gap_m(motions.travel_m()) + approach_m;
+        // Blocks whose gaps may be used up are proven with each motion, as all of the first rods are.
         for stretch in stretches(rods) {
             let blocks = stretch.start / BLOCK..stretch.end.div_ceil(BLOCK);
             let mut later = blocks.filter(|&block| block_rods(block, rods).end > first_rods);

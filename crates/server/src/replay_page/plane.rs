@@ -224,7 +224,8 @@ pub(super) mod tests {
                 list.extend((0..listed).map(|_| f32::from_bits(word(take(4)))));
             }
         }
-        let (order, width) = (take(1)[0], take(1)[0] as usize);
+        let order = take(1)[0];
+        let width = take(1)[0] as usize;
         let is_shared = take(1)[0] == 1;
         let shared: Vec<u32> =
             (0..count).map(|_| if is_shared { word(take(4)) } else { 0 }).collect();

@@ -73,7 +73,8 @@ impl Replay {
     }
 
     fn frames(&self) -> Vec<FrameColumns> {
-        let (run, parts) = (self.run(), self.parts());
+        let run = self.run();
+        let parts = self.parts();
         let dimensions = run["scene"]["dimensions"].as_u64().expect("a number") as usize;
         let chunks = run["chunks"].as_array().expect("chunks");
         let part = |chunk: &Value| &parts[chunk["part"].as_u64().expect("a number") as usize];
@@ -100,7 +101,8 @@ fn decode_chunk(bytes: &[u8], d: usize) -> Vec<FrameColumns> {
         let turns = plane(bodies * if d == 2 { 1 } else { 4 });
         let conditions = plane(bodies);
         for ((places, turns), conditions) in places.into_iter().zip(turns).zip(conditions) {
-            let (table, line_starts) = (table as u32, line_starts.clone());
+            let table = table as u32;
+            let line_starts = line_starts.clone();
             frames.push(FrameColumns { table, places, turns, line_starts, conditions });
         }
     }
