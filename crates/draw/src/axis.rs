@@ -60,19 +60,44 @@ impl Axis {
         values: impl Iterator<Item = f64>,
         most: usize,
     ) -> Result<FittedAxis, DrawError> {
+        self.fit_with_room(values, most, Room::None)
+    }
+
+    /// Fixes the range like [`Self::fit`], for values with marks: none lies on the frame, which would hide half of it,
+    /// unless its range is given or the frame is at zero.
+    pub(crate) fn fit_marks(
+        &self,
+        values: impl Iterator<Item = f64>,
+        most: usize,
+    ) -> Result<FittedAxis, DrawError> {
+        self.fit_with_room(values, most, Room::ForMarks)
+    }
+
+    fn fit_with_room(
+        &self,
+        values: impl Iterator<Item = f64>,
+        most: usize,
+        room: Room,
+    ) -> Result<FittedAxis, DrawError> {
         let ticks: Vec<f64> =
             self.ticks.iter().flatten().copied().filter(|v| self.contains(*v)).collect();
         let values = values.chain(ticks.iter().copied()).filter(|v| self.contains(*v));
+        let extent = extent(values);
         let (low, high) = match self.range {
             Some(range) => self.checked(range)?,
-            None => self.round_out(extent(values), most),
+            None => self.round_out(extent, most),
         };
         let ticks = match (&self.ticks, self.log) {
             (Some(_), _) => Ticks::from_values(&ticks),
             (None, true) => Ticks::log(low, high, most),
             (None, false) => Ticks::linear(low, high, most),
         };
-        Ok(FittedAxis { log: self.log, low, high, ticks: clip_ticks(ticks, low, high) })
+        let ticks = clip_ticks(ticks, low, high);
+        let mut fitted = FittedAxis { log: self.log, low, high, ticks };
+        if let (Room::ForMarks, None, Some(extent)) = (room, self.range, extent) {
+            fitted.make_room(extent);
+        }
+        Ok(fitted)
     }
 
     fn checked(&self, (low, high): (f64, f64)) -> Result<(f64, f64), DrawError> {
@@ -103,6 +128,13 @@ impl Axis {
             (false, given, Some(extent)) => round_linear(extent, given, most),
         }
     }
+}
+
+/// Whether values may lie on the frame of a chart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Room {
+    None,
+    ForMarks,
 }
 
 fn round_linear(extent: (f64, f64), ticks_given: bool, most: usize) -> (f64, f64) {
@@ -175,6 +207,22 @@ impl FittedAxis {
     pub(crate) fn rows(names: &[String]) -> Self {
         let high = names.len().max(1) as f64;
         Self { log: false, low: 0.0, high, ticks: Ticks::rows(names) }
+    }
+
+    /// Moves the ends on which values lie outward, beyond the last tick; zero stays, since bars and shares start there.
+    fn make_room(&mut self, extent: (f64, f64)) {
+        // The part of the axis that a mark takes up, with some air.
+        const MARK_PART: f64 = 0.04;
+        let low = self.value_at(-MARK_PART);
+        let high = self.value_at(1.0 + MARK_PART);
+        let is_near_low = extent.0 < self.value_at(MARK_PART / 2.0);
+        let is_near_high = extent.1 > self.value_at(1.0 - MARK_PART / 2.0);
+        if is_near_low && self.low != 0.0 {
+            self.low = low;
+        }
+        if is_near_high && self.high != 0.0 {
+            self.high = high;
+        }
     }
 
     /// Lays the range's low end at pixel `from` and its high end at pixel `to`.
@@ -262,6 +310,22 @@ mod tests {
         assert_eq!(fit(&Axis::log("t"), &[0.3, 7000.0]), (0.1, 10_000.0));
         assert_eq!(fit(&Axis::log("t"), &[1.0, 10.0]), (1.0, 10.0));
         assert_eq!(fit(&Axis::log("t"), &[10.0]), (5.0, 20.0));
+    }
+
+    #[test]
+    fn marks_do_not_lie_on_the_frame_unless_it_is_at_zero() {
+        let fit = |axis: &Axis, values: &[f64]| {
+            let fitted = axis.fit_marks(values.iter().copied(), 5).unwrap();
+            let last_tick = fitted.ticks.major.last().unwrap().0;
+            (fitted.low, fitted.high, last_tick)
+        };
+        let axis = Axis::linear("n");
+        assert_eq!(fit(&axis, &[8.0, 16.0]), (7.68, 16.32, 16.0));
+        assert_eq!(fit(&axis, &[0.0, 1.0]), (0.0, 1.04, 1.0));
+        assert_eq!(fit(&axis, &[0.0, 0.9]), (0.0, 1.0, 1.0));
+        assert_eq!(fit(&axis.range(0.0, 1.0), &[0.0, 1.0]), (0.0, 1.0, 1.0));
+        let (low, high, last_tick) = fit(&Axis::log("t"), &[1.0, 10.0]);
+        assert!(low < 1.0 && high > 10.0 && last_tick == 10.0, "{low} {high} {last_tick}");
     }
 
     #[test]

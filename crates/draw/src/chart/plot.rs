@@ -199,8 +199,13 @@ impl Plot {
     pub fn draw(&self, style: &Style) -> Result<DrawnChart, DrawError> {
         style.check()?;
         let (most_across, most_up) = max_ticks(style);
-        let x = self.x.fit(self.drawable().flat_map(x_values), most_across)?;
-        let y = self.y.fit(self.drawable().flat_map(y_values), most_up)?;
+        let has_markers = self.series.iter().any(Series::shows_markers);
+        let fit = |axis: &Axis, values: Vec<f64>, most: usize| {
+            let values = values.into_iter();
+            if has_markers { axis.fit_marks(values, most) } else { axis.fit(values, most) }
+        };
+        let x = fit(&self.x, self.drawable().flat_map(x_values).collect(), most_across)?;
+        let y = fit(&self.y, self.drawable().flat_map(y_values).collect(), most_up)?;
         let words = FrameText {
             title: &self.title,
             note: &self.note,

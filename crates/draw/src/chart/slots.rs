@@ -100,7 +100,7 @@ impl SlotChart {
     /// [`DrawError::Value`] if the style or the axis's given range is impossible.
     pub fn draw(&self, style: &Style) -> Result<DrawnChart, DrawError> {
         style.check()?;
-        let y = self.y.fit(self.heights(), max_ticks(style).1)?;
+        let y = self.y.fit_marks(self.heights(), max_ticks(style).1)?;
         let names: Vec<String> = self.slots.iter().map(|slot| slot.label.clone()).collect();
         let words = FrameText {
             title: &self.title,

@@ -25,6 +25,8 @@ pub struct SummaryOptions {
     pub privilege_note: Option<String>,
     /// Resamples, coverage and seed of bootstrap intervals.
     pub bootstrap: Bootstrap,
+    /// The metrics that the world is about: where variants differ in them, they come before all others.
+    pub central_metrics: &'static [&'static str],
     /// The metrics in words.
     pub meanings: &'static [MetricInfo],
 }
@@ -57,6 +59,7 @@ impl Default for SummaryOptions {
             seedless: BTreeSet::new(),
             privilege_note: None,
             bootstrap: Bootstrap::default(),
+            central_metrics: &[],
             meanings: &[],
         }
     }

@@ -43,6 +43,7 @@ impl Plan {
             better: self.better.clone(),
             privilege_note: self.privilege_note(),
             against: self.baseline.as_ref().map(|baseline| baseline_choice(baseline, &names)),
+            central_metrics: world.map_or(&[], WorldType::chart_metrics),
             meanings: world.map_or(&[], WorldType::metric_infos),
             names: Some(names),
             ..SummaryOptions::default()

@@ -5,7 +5,9 @@
 //! The requested ones, in that order. Otherwise all that differ between any two runs, the most
 //! informative first: by the share of their variance that lies between the variants, adjusted for
 //! the number of variants (epsilon squared, Kelley 1935: 1 - mean square within / mean square in
-//! total), so that effects of the parameters come before noise. Ties stay in the order of the
+//! total), so that effects of the parameters come before noise. Those that the world is about come before
+//! others, in its order, if variants explain at least [`MIN_EXPLAINED`] of their variance: a method is judged by the
+//! losses of separation, not by a count of its own steps that differs even more. Ties stay in the order of the
 //! columns, and so do all metrics if the share cannot be computed: with one variant, or one run of
 //! each. Metrics beyond [`SummaryOptions::max_metrics`] are left out. [`Summary::left_out`] lists
 //! every metric that is not shown, and why.
@@ -33,6 +35,10 @@ use std::collections::BTreeMap;
 /// Number of runs of a variant above which no bootstrap is drawn: a mean of so many runs is as good as normal (central
 /// limit theorem), so Student's interval is as good, and thousands of resamples of each metric would take long.
 const BOOTSTRAP_RUNS: usize = 10_000;
+
+/// Share of the variance from which on a metric that the world is about counts as different: a medium effect (Cohen
+/// 1988).
+const MIN_EXPLAINED: f64 = 0.06;
 
 impl Summary {
     /// Summarizes a table of runs.
@@ -224,20 +230,31 @@ fn select_metrics<'a>(
         return metrics_by_name(&all, names);
     }
     let mut left_out = Vec::new();
-    let mut shown: Vec<(f64, &RunColumn)> = Vec::new();
+    let mut central: Vec<(usize, &RunColumn)> = Vec::new();
+    let mut others: Vec<(f64, &RunColumn)> = Vec::new();
     for column in all {
-        match omission_reason(column) {
-            Some(reason) => left_out.push(OmittedMetric { metric: column.name.clone(), reason }),
-            None => shown.push((explained_variance(groups, column).unwrap_or(0.0), column)),
+        if let Some(reason) = omission_reason(column) {
+            left_out.push(OmittedMetric { metric: column.name.clone(), reason });
+            continue;
+        }
+        let explained = explained_variance(groups, column).unwrap_or(0.0);
+        let place = options.central_metrics.iter().position(|name| *name == column.name);
+        match place.filter(|_| explained >= MIN_EXPLAINED) {
+            Some(place) => central.push((place, column)),
+            None => others.push((explained, column)),
         }
     }
+    central.sort_by_key(|(place, _)| *place);
     // A stable sort, so that ties stay in the order of the columns.
-    shown.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-    for (_, column) in shown.split_off(options.max_metrics.min(shown.len())) {
+    others.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    let central = central.into_iter().map(|(_, column)| column);
+    let mut shown: Vec<&RunColumn> =
+        central.chain(others.into_iter().map(|(_, column)| column)).collect();
+    for column in shown.split_off(options.max_metrics.min(shown.len())) {
         let reason = format!("beyond the {} most informative metrics", options.max_metrics);
         left_out.push(OmittedMetric { metric: column.name.clone(), reason });
     }
-    Ok((shown.into_iter().map(|(_, column)| column).collect(), left_out))
+    Ok((shown, left_out))
 }
 
 /// Returns the columns of the metrics of which some values are better.

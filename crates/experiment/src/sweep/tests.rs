@@ -223,6 +223,15 @@ fn what_parameters_move_comes_first_and_what_is_left_out_is_told() {
 }
 
 #[test]
+fn metrics_that_a_world_is_about_come_first_where_variants_differ_in_them() {
+    let central_metrics = &["noise_m", "arrived"];
+    let options = SummaryOptions { central_metrics, ..Default::default() };
+    let summary = Summary::from_table(&grid(), &options).unwrap();
+    let names: Vec<&str> = summary.metrics.iter().map(|m| m.name.as_str()).collect();
+    assert_eq!(names, ["arrived", "mean_delay_percent", "noise_m"], "variants differ in no noise");
+}
+
+#[test]
 fn pairs_cancel_what_replicates_have_in_common() {
     let summary = against_the_calmest(&grid());
     assert_eq!(summary.baseline.as_deref(), Some("calm 10"));

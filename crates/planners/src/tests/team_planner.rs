@@ -119,7 +119,7 @@ proptest! {
     }
 
     #[test]
-    fn agents_that_slip_arrive_by_each_executor_and_a_kept_state_goes_on_alike(
+    fn agents_that_have_slipped_arrive_by_each_executor_and_a_kept_state_goes_on_alike(
         problem in problems(7, 2, 5), seed in any::<u64>(),
     ) {
         let streams = Streams::new(Seed(seed));
@@ -139,7 +139,11 @@ proptest! {
                     other.poses.clone_from(&team.poses);
                     kept = Some(other);
                 }
-                let slips = |agent: usize| streams.block(agent as u32, step, SLIPS, 0)[0].is_multiple_of(5);
+                // By the clock alone whoever slips may never arrive: no slips, and the next plan must lead there.
+                let may_slip = step < 300;
+                let slips = |agent: usize| {
+                    may_slip && streams.block(agent as u32, step, SLIPS, 0)[0].is_multiple_of(5)
+                };
                 team.step(slips);
                 if let Some(other) = &mut kept {
                     other.step(slips);
