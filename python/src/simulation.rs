@@ -16,10 +16,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, MultiAgentOrder};
 use sidestep::kernel::ports::{ColumnValues, TableSchema};
-use sidestep::kernel::view::{Body, BodyId, FrameOptions};
+use sidestep::kernel::view::{AgentNumber, Body, BodyId, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
 use sidestep::scenario::{ResolvedScenario, Source};
-use sidestep_draw::{AnimationFrame, AnimationRenderer, DrawError};
+use sidestep_draw::{
+    AnimationFrame, AnimationLook, AnimationRenderer, AnimationSize, DrawError, PictureView,
+    TrailChoice,
+};
 use sidestep_session::{ManagedRun, OutputPaths, RowSelection};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -56,8 +59,8 @@ pub(crate) struct Simulation {
     teams: Vec<Arc<control::AgentTeam>>,
     /// `None` when it is closed.
     run: Mutex<Option<ManagedRun>>,
-    /// The renderer of its pictures, with their width in pixels: kept, since it draws the scenery once for all pictures.
-    renderer: Mutex<Option<(u32, AnimationRenderer)>>,
+    /// The renderer of its pictures, with their look: kept, since it draws the scenery once for all pictures.
+    renderer: Mutex<Option<(AnimationLook, AnimationRenderer)>>,
 }
 
 impl Simulation {
@@ -201,20 +204,25 @@ impl Simulation {
         })
     }
 
-    fn draw(&self, py: Python<'_>, width: u32) -> PyResult<(AnimationFrame, (u32, u32))> {
+    fn draw(&self, py: Python<'_>, look: AnimationLook) -> PyResult<(AnimationFrame, (u32, u32))> {
         self.with_run(py, |run| {
             let simulation = run.simulation_mut();
             let frame = simulation.frame(FrameOptions::WITHOUT_SCANS);
+            AgentNumber::check_all(&look.trails.agents, &frame.bodies)
+                .map_err(|e| argument_error("agents", e.cause(), e.remedy()))?;
+            let scenery = simulation.scenery();
+            // Without a floor the view is that of the present state, which a kept renderer has not.
+            let is_kept = scenery.floor.is_some();
             let mut kept = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
             let renderer = match kept.take() {
-                Some((kept_width, renderer)) if kept_width == width => renderer,
-                _ => AnimationRenderer::new(simulation.scenery(), &[], width)
-                    .map_err(|e| argument_error("width", e.to_string(), "give 1 to 4096 pixels"))?,
+                Some((kept_look, renderer)) if is_kept && kept_look == look => renderer,
+                _ => AnimationRenderer::new(scenery, std::slice::from_ref(&frame), &look)
+                    .map_err(|e| look_error(&e))?,
             };
             let caption = format!("cycle {}", frame.cycle);
             let still = renderer.render(&frame, &[], &caption).map_err(|e| draw_error(&e))?;
             let size = renderer.size_px();
-            *kept = Some((width, renderer));
+            *kept = Some((look, renderer));
             Ok((still, size))
         })
     }
@@ -262,6 +270,39 @@ struct SliceOutcome {
 
 fn condition_name(body: &Body) -> String {
     format!("{:?}", body.state).to_lowercase()
+}
+
+/// Returns the look of a picture from the arguments of `render`.
+fn parse_look(
+    width: u32,
+    size: Option<[u32; 2]>,
+    agents: Vec<u32>,
+    view: Option<&str>,
+) -> PyResult<AnimationLook> {
+    let view = match view.map(str::parse::<PictureView>) {
+        None => PictureView::Usual,
+        Some(Ok(view)) => view,
+        Some(Err(cause)) => {
+            let remedy = "give \"top\", \"side\", \"front\" or angles, like \"-60,30\"";
+            return Err(argument_error("view", cause, remedy));
+        }
+    };
+    let agents = agents.into_iter().map(|number| AgentNumber { number, part: None }).collect();
+    let trails = TrailChoice { agents, from: None };
+    Ok(AnimationLook {
+        size: size.map_or(AnimationSize::LongerSide(width), AnimationSize::Exact),
+        trails,
+        view,
+    })
+}
+
+fn look_error(error: &DrawError) -> PyErr {
+    match error {
+        DrawError::FlatView(_) => {
+            argument_error("view", error.to_string(), "give \"top\", or leave it out")
+        }
+        _ => argument_error("width", error.to_string(), "give 1 to 4096 pixels"),
+    }
 }
 
 fn draw_error(error: &DrawError) -> PyErr {
@@ -541,13 +582,26 @@ impl Simulation {
 
     /// Renders the present state as an image: an array (height, width, 3) of red, green and blue (uint8).
     ///
-    /// Raises InputError when the width is 0 or above 4096 pixels.
+    /// `width` is its longer side in pixels; with `size`, (width, height), it is exactly as large, with its line of text.
+    /// The agents with the numbers `agents` stand out, the others are pale. `view` is the side from which a run in space
+    /// is seen: "top", "side", "front", or degrees about the vertical and above the horizon, "-60,30".
+    ///
+    /// Raises InputError when a side is 0 or above 4096 pixels, no agent has such a number, or there is no such view.
     ///
     /// >>> sim.render(100).shape[1:]
     /// (100, 3)
-    #[pyo3(signature = (width=640))]
-    fn render<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        let (still, (width, height)) = self.draw(py, width)?;
+    /// >>> sim.render(size=(320, 200), agents=[1], view="top").shape
+    /// (200, 320, 3)
+    #[pyo3(signature = (width=640, *, size=None, agents=Vec::new(), view=None))]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        width: u32,
+        size: Option<[u32; 2]>,
+        agents: Vec<u32>,
+        view: Option<&str>,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let (still, (width, height)) = self.draw(py, parse_look(width, size, agents, view)?)?;
         let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
         let pixels: Vec<u8> = opaque.copied().collect();
         PyArray1::from_vec(py, pixels).reshape([height as usize, width as usize, 3])
@@ -557,9 +611,16 @@ impl Simulation {
     ///
     /// >>> bool((sim.picture(100) == sim.render(100)).all())
     /// True
-    #[pyo3(signature = (width=640))]
-    fn picture<'py>(&self, py: Python<'py>, width: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        self.render(py, width)
+    #[pyo3(signature = (width=640, *, size=None, agents=Vec::new(), view=None))]
+    fn picture<'py>(
+        &self,
+        py: Python<'py>,
+        width: u32,
+        size: Option<[u32; 2]>,
+        agents: Vec<u32>,
+        view: Option<&str>,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        self.render(py, width, size, agents, view)
     }
 
     /// Returns the present frame as a table, one row for each body: kind, place, orientation, velocity and condition.
@@ -734,7 +795,7 @@ impl Simulation {
 
     /// Returns the picture as PNG, for notebooks; None when it is closed.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyBytes>>> {
-        match self.draw(py, NOTEBOOK_WIDTH_PX) {
+        match self.draw(py, AnimationLook::longer_side(NOTEBOOK_WIDTH_PX)) {
             Ok((still, _)) => {
                 let bytes = still.to_png().map_err(|e| draw_error(&e))?;
                 Ok(Some(PyBytes::new(py, &bytes)))

@@ -8,7 +8,7 @@
 //! report.rs           a run's summary as text           report_files.rs  documents as files
 //! exit.rs             exit codes and failures           console.rs       standard output and error
 //! link.rs             the program of fleets             fleet_table.rs   its nodes as a table
-//! fleet_watch.rs      fleets that the studio watches
+//! fleet_watch.rs      fleets that the studio watches   size.rs          sizes of figures and pictures
 //! ```
 //!
 //! The crate `sidestep-session` drives the runs.
@@ -23,6 +23,7 @@ mod console_watcher;
 mod exit;
 mod fleet_table;
 mod fleet_watch;
+mod fonts;
 mod foxglove;
 #[cfg(test)]
 mod hints;
@@ -32,6 +33,7 @@ mod progress;
 mod report;
 mod report_files;
 mod scenario_args;
+mod size;
 mod sweep;
 
 use exit::ExitCode;

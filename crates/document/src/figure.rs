@@ -76,6 +76,10 @@ pub enum FigureKind {
         is_joined: bool,
         /// Whether there is a line at zero, as differences need it.
         has_zero_line: bool,
+        /// Whether bars from zero show the means, as of counts.
+        has_bars: bool,
+        /// What the legend calls its marks.
+        legend: RunLegend,
     },
     /// Colors over two factors: a series is a row, `x` the number of a column, `y` the value.
     Heat {
@@ -89,6 +93,21 @@ pub enum FigureKind {
         /// The corners of the front.
         corners: Vec<(f64, f64)>,
     },
+}
+
+/// What the legend of a figure of single runs calls its marks.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RunLegend {
+    /// A line that joins the runs of one seed.
+    pub seed: String,
+    /// A mean with its interval.
+    pub mean: String,
+}
+
+impl Default for RunLegend {
+    fn default() -> Self {
+        Self { seed: "one seed".into(), mean: "mean, 95 % interval".into() }
+    }
 }
 
 /// What is drawn beside the runs of a slot.
@@ -150,6 +169,26 @@ impl Figure {
             FigureKind::Forest { rows, .. } => rows,
             FigureKind::Heat { columns, .. } => columns,
             _ => &mut [],
+        }
+    }
+
+    /// Returns the words of its legend that are no names of series.
+    pub fn legend_words(&self) -> Vec<&String> {
+        match &self.kind {
+            FigureKind::Runs { legend, is_joined, slots, .. } => {
+                let seed = is_joined.then_some(&legend.seed);
+                let has_mean = slots.iter().any(|slot| slot.mean.is_some());
+                seed.into_iter().chain(has_mean.then_some(&legend.mean)).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Returns the same words, to be replaced.
+    pub fn legend_words_mut(&mut self) -> Vec<&mut String> {
+        match &mut self.kind {
+            FigureKind::Runs { legend, .. } => vec![&mut legend.seed, &mut legend.mean],
+            _ => Vec::new(),
         }
     }
 

@@ -97,6 +97,7 @@ fn corridor() -> Result<String, DrawError> {
         floor: Some(floor),
         bodies: Vec::new(),
         names: Vec::new(),
+        groups: Vec::new(),
         earth: Default::default(),
     };
     let frame = Frame { bodies, ..Frame::default() };

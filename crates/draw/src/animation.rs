@@ -8,7 +8,10 @@ use sidestep_kernel::view::{Frame, Scenery, Trail, Vec3};
 
 use crate::error::DrawError;
 use crate::picture::canvas::{Camera, Canvas};
-use crate::picture::{Scene, animation_bounds, check_content, projected_bounds};
+use crate::picture::{
+    PictureView, Scene, TrailChoice, animation_bounds, best_camera, check_content, check_view,
+    projected_bounds,
+};
 use crate::raster::parse;
 use crate::svg::{Anchor, Rect, Svg, TextStyle};
 use crate::text::Fonts;
@@ -20,39 +23,74 @@ const MAX_FRAME_PX: u32 = 4096;
 /// Height of the line of text under the picture, pixels.
 const CAPTION_HEIGHT_PX: u32 = 24;
 
+/// The size of the pictures of an animation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AnimationSize {
+    /// The longer side of what is shown, in pixels: the other one follows from it, and the line of text is added.
+    LongerSide(u32),
+    /// Width and height of all of it, in pixels: what is shown is as large as it can be, in the middle.
+    Exact([u32; 2]),
+}
+
+/// What the pictures of an animation show, and how large.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnimationLook {
+    /// Their size.
+    pub size: AnimationSize,
+    /// The trails that they show.
+    pub trails: TrailChoice,
+    /// The direction of view.
+    pub view: PictureView,
+}
+
+impl AnimationLook {
+    /// Returns the usual look of pictures with a longer side of so many pixels.
+    pub fn longer_side(longer_side_px: u32) -> Self {
+        let size = AnimationSize::LongerSide(longer_side_px);
+        Self { size, trails: TrailChoice::default(), view: PictureView::Usual }
+    }
+}
+
 /// A view of a run, with the parts of it that never move.
 pub struct AnimationRenderer {
     scenery: Scenery,
+    trails: TrailChoice,
     canvas: Canvas,
     window: Rect,
     background: Pixmap,
 }
 
 impl AnimationRenderer {
-    /// Returns a film that shows the content of all frames, `width_px` wide, or less if it would be
-    /// higher than that. Width and height in pixels are even, because video formats require it.
+    /// Returns a film that shows the content of all frames. With a longer side, width and height in pixels are even,
+    /// because video formats require it.
     ///
     /// # Errors
-    /// When the width is 0 or above 4096, or places are not finite.
-    pub fn new(scenery: Scenery, frames: &[Frame], width_px: u32) -> Result<Self, DrawError> {
-        if width_px > MAX_FRAME_PX {
-            return Err(DrawError::TooLarge {
-                what: "animation width in px",
-                found: u64::from(width_px),
-                limit: u64::from(MAX_FRAME_PX),
-            });
-        }
-        DrawError::positive("animation width in px", f64::from(width_px))?;
+    /// When a side is 0 or above 4096, or leaves no room, places are not finite, or the view is none of a plane.
+    pub fn new(
+        scenery: Scenery,
+        frames: &[Frame],
+        look: &AnimationLook,
+    ) -> Result<Self, DrawError> {
+        check_size(look.size)?;
+        check_view(&scenery, look.view)?;
         check_content(&scenery, &Frame::default(), &[])?;
-        let (canvas, window) = view(&scenery, animation_bounds(&scenery, frames)?, width_px);
-        let width = window.width as u32;
-        let height = window.height as u32 + CAPTION_HEIGHT_PX;
+        let box_m = animation_bounds(&scenery, frames)?;
+        let camera = look.view.camera().unwrap_or_else(|| usual_camera(&scenery, frames));
+        let (canvas, window) = canvas(camera, box_m, look.size);
+        let canvas = Canvas { is_plane: scenery.dimensions == 2, ..canvas };
+        let (width, height) = match look.size {
+            AnimationSize::LongerSide(_) => {
+                (window.width as u32, window.height as u32 + CAPTION_HEIGHT_PX)
+            }
+            AnimationSize::Exact([width, height]) => (width, height),
+        };
         let mut still = Pixmap::new(width, height).ok_or_else(no_area)?;
         still.fill(Color::WHITE);
-        let mut film = Self { scenery, canvas, window, background: still };
+        let trails = look.trails.clone();
+        let mut film = Self { scenery, trails, canvas, window, background: still };
         let mut svg = Svg::default();
         let nothing = Frame::default();
-        let scene = Scene::new(&film.scenery, &nothing, &[]);
+        let scene = Scene::new(&film.scenery, &nothing, &[], &film.trails);
         svg.open_clip(window);
         scene.draw_still(&mut svg, &film.canvas);
         svg.close_group();
@@ -76,12 +114,13 @@ impl AnimationRenderer {
         caption: &str,
     ) -> Result<AnimationFrame, DrawError> {
         check_content(&self.scenery, frame, trails)?;
-        let scene = Scene::new(&self.scenery, frame, trails).with_thin_trails();
+        let scene = Scene::new(&self.scenery, frame, trails, &self.trails).with_thin_trails();
         let mut svg = Svg::default();
         svg.open_clip(self.window);
         scene.draw_moving(&mut svg, &self.canvas);
         svg.close_group();
-        svg.text(8.0, self.window.bottom() + 17.0, caption, &TextStyle::new(13.0, Anchor::Start));
+        let baseline = f64::from(self.background.height() - CAPTION_HEIGHT_PX) + 17.0;
+        svg.text(8.0, baseline, caption, &TextStyle::new(13.0, Anchor::Start));
         Ok(AnimationFrame(self.composite(svg)?))
     }
 
@@ -100,18 +139,60 @@ fn no_area() -> DrawError {
     DrawError::Svg("the picture has no area".into())
 }
 
-/// Returns the canvas that shows a box in a picture of this width, and the part of the picture that
-/// it takes.
-fn view(scenery: &Scenery, box_m: [Vec3; 2], width_px: u32) -> (Canvas, Rect) {
-    let camera = if scenery.dimensions == 2 { Camera::ABOVE } else { Camera::CORNER };
+fn check_size(size: AnimationSize) -> Result<(), DrawError> {
+    let (sides, least_px) = match size {
+        AnimationSize::LongerSide(px) => ([px, px], 1),
+        AnimationSize::Exact([width, height]) => {
+            ([width, height.saturating_sub(CAPTION_HEIGHT_PX)], MIN_FRAME_PX)
+        }
+    };
+    for px in sides {
+        if px > MAX_FRAME_PX {
+            return Err(DrawError::TooLarge {
+                what: "animation width in px",
+                found: u64::from(px),
+                limit: u64::from(MAX_FRAME_PX),
+            });
+        }
+        if px < least_px {
+            let must = "at least 32, and 24 more for the line of text";
+            return Err(DrawError::Value { what: "animation size in px", value: px.into(), must });
+        }
+    }
+    Ok(())
+}
+
+/// Returns the camera for some frames if no view is chosen.
+fn usual_camera(scenery: &Scenery, frames: &[Frame]) -> Camera {
+    if scenery.dimensions == 2 {
+        return Camera::ABOVE;
+    }
+    // The same view for all of them, whatever balls hide in some.
+    best_camera(&frames.iter().collect::<Vec<_>>(), &[])
+}
+
+/// Returns the canvas that shows a box in a picture of some size, and the part of the picture that it takes.
+fn canvas(camera: Camera, box_m: [Vec3; 2], size: AnimationSize) -> (Canvas, Rect) {
     let [lo, hi] = projected_bounds(camera, box_m);
     let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
-    let px_per_m = f64::from(width_px) / size_m[0].max(size_m[1]);
-    let [width, height] = size_m.map(|length_m| even_px(length_m * px_per_m));
-    let window = Rect { x: 0.0, y: 0.0, width, height };
+    let (px_per_m, window) = match size {
+        AnimationSize::LongerSide(longer_px) => {
+            let px_per_m = f64::from(longer_px) / size_m[0].max(size_m[1]);
+            let [width, height] = size_m.map(|length_m| even_px(length_m * px_per_m));
+            (px_per_m, Rect { x: 0.0, y: 0.0, width, height })
+        }
+        AnimationSize::Exact([width, height]) => {
+            let room_px = [f64::from(width), f64::from(height - CAPTION_HEIGHT_PX)];
+            let px_per_m = (room_px[0] / size_m[0]).min(room_px[1] / size_m[1]);
+            let [width, height] = size_m.map(|length_m| length_m * px_per_m);
+            let x = 0.5 * (room_px[0] - width);
+            let y = 0.5 * (room_px[1] - height);
+            (px_per_m, Rect { x, y, width, height })
+        }
+    };
     let depths_m = Camera::range(camera.to_eye, box_m);
-    let canvas = Canvas { camera, px_per_m, zero: (0.0, window.height), origin_m: lo, depths_m };
-    (canvas, window)
+    let zero = (window.x, window.bottom());
+    (Canvas { camera, px_per_m, zero, origin_m: lo, depths_m, is_plane: false }, window)
 }
 
 /// Returns the nearest even number of pixels within the limits, because video encoders take no odd sizes.
@@ -147,7 +228,12 @@ mod tests {
 
     /// A film of 20 by 10 meters, 200 pixels wide.
     fn film(bodies: Vec<Body>) -> AnimationRenderer {
-        AnimationRenderer::new(Scenery { bodies, ..plane(20, 10) }, &[], 200).unwrap()
+        AnimationRenderer::new(
+            Scenery { bodies, ..plane(20, 10) },
+            &[],
+            &AnimationLook::longer_side(200),
+        )
+        .unwrap()
     }
 
     fn still(film: &AnimationRenderer, bodies: Vec<Body>, caption: &str) -> AnimationFrame {
@@ -193,7 +279,8 @@ mod tests {
         let inked = (100..124).flat_map(|y| (0..200).map(move |x| (x, y)));
         assert!(inked.filter(|&(x, y)| pixel(&picture, x, y)[0] < 128).count() > 20);
         for width_px in [0, 9000] {
-            assert!(AnimationRenderer::new(plane(20, 10), &[], width_px).is_err());
+            let look = AnimationLook::longer_side(width_px);
+            assert!(AnimationRenderer::new(plane(20, 10), &[], &look).is_err());
         }
         for at in [f64::NAN, 1e300] {
             let lost = vec![ball(CONNECTOR, 0, [at, 0.0, 0.0], 1.0)];

@@ -24,6 +24,9 @@ pub enum DrawError {
         /// The condition that a right value meets.
         must: &'static str,
     },
+    /// A view of a plane from elsewhere than above.
+    #[error("there is no view {0}: everything lies in a plane, which is seen from above")]
+    FlatView(String),
     /// A picture that would take too much memory.
     #[error("{what}: {found} asked for, at most {limit} can be drawn")]
     TooLarge {

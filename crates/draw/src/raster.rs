@@ -8,7 +8,7 @@ use crate::text::Fonts;
 use std::sync::Arc;
 
 /// Longest side of a PNG in pixels: 256 MiB of pixels.
-const MAX_PNG_PX: u32 = 8192;
+pub const MAX_PNG_PX: u32 = 8192;
 
 /// Rasterizes an SVG picture so that its longer side is `max_px` pixels.
 ///

@@ -90,6 +90,8 @@ pub struct Style {
 }
 
 impl Style {
+    /// Least width and height in SVG pixels.
+    pub const MIN_SIDE_PX: f64 = 100.0;
     /// A figure one column wide.
     pub const CHART: Self = Self { width_px: 640.0, height_px: 420.0, font_px: 13.0 };
     /// A map as large as a page.
@@ -109,7 +111,7 @@ impl Style {
         for (what, value) in
             [("picture width in px", self.width_px), ("picture height in px", self.height_px)]
         {
-            if !(100.0..=20_000.0).contains(&value) {
+            if !(Self::MIN_SIDE_PX..=20_000.0).contains(&value) {
                 return Err(DrawError::Value { what, value, must: "100 to 20000" });
             }
         }

@@ -193,6 +193,31 @@ impl Svg {
     }
 }
 
+/// Returns the size in which a document is shown.
+pub(crate) fn page_size(document: &str) -> Option<[f64; 2]> {
+    let (_, rest) = document.split_once("viewBox=\"0 0 ")?;
+    let (width, height) = rest.split_once('"')?.0.split_once(' ')?;
+    Some([width.parse().ok()?, height.parse().ok()?])
+}
+
+/// Returns a document in the middle of a page of another size in its own pixels, shown in a size of the same proportions.
+pub(crate) fn on_page(document: &str, page_px: [f64; 2], shown_px: [f64; 2]) -> String {
+    let Some(own_px) = page_size(document) else { return document.to_string() };
+    let [width, height] = own_px.map(SvgNumber);
+    let [page_width, page_height] = page_px.map(SvgNumber);
+    let [shown_width, shown_height] = shown_px.map(SvgNumber);
+    let [left, top] = [0, 1].map(|k| SvgNumber(-0.5 * (page_px[k] - own_px[k])));
+    let own = format!("width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\"");
+    let page = format!(
+        "width=\"{shown_width}\" height=\"{shown_height}\" viewBox=\"{left} {top} {page_width} {page_height}\""
+    );
+    // The ground covers the page, which begins before the document.
+    let ground = "<rect width=\"100%\" height=\"100%\"";
+    let page_ground =
+        format!("<rect x=\"{left}\" y=\"{top}\" width=\"{page_width}\" height=\"{page_height}\"");
+    document.replacen(&own, &page, 1).replacen(ground, &page_ground, 1)
+}
+
 const HALO: &str =
     r##" stroke="#FFFFFF" stroke-width="3" stroke-linejoin="round" paint-order="stroke""##;
 

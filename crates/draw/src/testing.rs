@@ -15,7 +15,16 @@ pub(crate) fn plane(width: u32, height: u32) -> Scenery {
 pub(crate) fn open(dimensions: u8) -> Scenery {
     let name = "A title that wraps where the picture is small, as it is here".into();
     let earth = Default::default();
-    Scenery { name, dimensions, cycle_s: 1.0, floor: None, bodies: vec![], names: vec![], earth }
+    Scenery {
+        name,
+        dimensions,
+        cycle_s: 1.0,
+        floor: None,
+        bodies: vec![],
+        names: vec![],
+        groups: vec![],
+        earth,
+    }
 }
 
 pub(crate) fn ball(kind: BodyKind, number: u32, at_m: Vec3, radius_m: f64) -> Body {

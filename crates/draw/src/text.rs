@@ -46,9 +46,35 @@ impl Fonts {
         let face = faces.first().and_then(|id| database.face(*id));
         let family = face.and_then(|face| face.families.first());
         let Some((family, _)) = family.cloned() else { return Err(DrawError::Font) };
-        // It stands in an attribute of the picture.
-        let family = family.replace(['"', '\'', '<', '>', '&', ','], " ");
-        Ok(Self { database: Arc::new(database), family: Some(family) })
+        let family = Some(quoted_family(&family));
+        Ok(Self { database: Arc::new(database), family })
+    }
+
+    /// Returns the names of the families in a font file; none if it is no font.
+    pub fn families(bytes: &[u8]) -> Vec<String> {
+        let mut database = fontdb::Database::new();
+        database.load_font_data(bytes.to_vec());
+        let mut names: Vec<String> = Vec::new();
+        for face in database.faces() {
+            // The first name is the English one.
+            names.extend(face.families.first().map(|(name, _)| name.clone()));
+        }
+        names.dedup();
+        names
+    }
+
+    /// Returns the embedded font, and before it a family from the files with its weights and slopes.
+    ///
+    /// # Errors
+    /// [`DrawError::Font`] if none of them is a font of this family.
+    pub fn from_family(family: &str, files: Vec<Vec<u8>>) -> Result<Self, DrawError> {
+        let mut database = (*fonts()).clone();
+        files.into_iter().for_each(|bytes| database.load_font_data(bytes));
+        let names = database.faces().filter_map(|face| face.families.first());
+        let name = names.map(|(name, _)| name).find(|name| name.eq_ignore_ascii_case(family));
+        let Some(name) = name else { return Err(DrawError::Font) };
+        let family = Some(quoted_family(name));
+        Ok(Self { database: Arc::new(database), family })
     }
 
     /// Returns a picture that names these fonts for its text.
@@ -57,6 +83,11 @@ impl Fonts {
         let embedded = format!("font-family=\"{FAMILIES}\"");
         svg.replacen(&embedded, &format!("font-family=\"'{family}', {FAMILIES}\""), 1)
     }
+}
+
+/// Returns the name of a family as it can stand in an attribute of a picture.
+fn quoted_family(family: &str) -> String {
+    family.replace(['"', '\'', '<', '>', '&', ','], " ")
 }
 
 /// Returns the font database of `to_png`: DejaVu Sans, regular and bold, and nothing else.
@@ -144,6 +175,16 @@ mod tests {
         assert!(fonts.apply(&svg).starts_with("<svg font-family=\"'DejaVu Sans', DejaVu"));
         assert_eq!(Fonts::default().apply(&svg), svg);
         assert!(matches!(Fonts::from_file_bytes(vec![1, 2, 3]), Err(DrawError::Font)));
+    }
+
+    #[test]
+    fn a_family_is_taken_from_its_files_whatever_the_case_of_its_name() {
+        let bold = dejavu::sans::bold().to_vec();
+        assert_eq!(Fonts::families(&bold), ["DejaVu Sans"]);
+        assert!(Fonts::families(b"no font").is_empty());
+        let fonts = Fonts::from_family("dejavu sans", vec![bold]).unwrap();
+        assert_eq!(fonts.family.as_deref(), Some("DejaVu Sans"));
+        assert!(matches!(Fonts::from_family("Missing", vec![]), Err(DrawError::Font)));
     }
 
     #[test]

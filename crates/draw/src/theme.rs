@@ -4,7 +4,7 @@ use crate::style::{FAINT_INK, GRID, GROUND, INK};
 
 /// The colors of charts, and those that take their places on a dark ground: as far from it as the others are from
 /// white.
-pub const DARK_COLORS: [(&str, &str); 11] = [
+pub const DARK_COLORS: [(&str, &str); 14] = [
     (GROUND, "#14171C"),
     (INK, "#E4E7EC"),
     (FAINT_INK, "#A2ABB8"),
@@ -16,6 +16,10 @@ pub const DARK_COLORS: [(&str, &str); 11] = [
     ("#E69F00", "#F2B134"),
     ("#56B4E9", "#9AD4F5"),
     ("#000000", "#F7F7F7"),
+    // Walls, ground that is not mapped, and the floor of pictures in space.
+    ("#3C3C3C", "#8A919C"),
+    ("#EDEBE6", "#2A2E35"),
+    ("#F7F7F5", "#1B1F26"),
 ];
 
 /// Returns a chart in the colors for a dark ground.

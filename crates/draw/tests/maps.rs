@@ -32,6 +32,7 @@ impl Scene {
             floor: Some(self.floor.clone()),
             bodies: Vec::new(),
             names: Vec::new(),
+            groups: Vec::new(),
             earth: Default::default(),
         };
         let frame = Frame { bodies: self.bodies.clone(), ..Frame::default() };

@@ -45,7 +45,7 @@ pub(crate) fn draw_chart(figure: &Figure, style: &Style) -> Result<DrawnChart, D
             plot(figure, Mark::Points).reference_path("front", corners.clone()).draw(style)
         }
         FigureKind::Forest { rows, texts } => forest(figure, rows, texts).draw(style),
-        FigureKind::Runs { slots, is_joined, has_zero_line } => {
+        FigureKind::Runs { slots, is_joined, has_zero_line, has_bars, legend } => {
             let mut chart = SlotChart::new(
                 &figure.title,
                 axis(figure.y_scale, &figure.y_label),
@@ -57,6 +57,10 @@ pub(crate) fn draw_chart(figure: &Figure, style: &Style) -> Result<DrawnChart, D
             if *has_zero_line {
                 chart = chart.zero_line();
             }
+            if *has_bars {
+                chart = chart.bars();
+            }
+            let chart = chart.legend_words(&legend.seed, &legend.mean);
             chart.x_label(&figure.x_label).note(&figure.note).draw(style)
         }
         FigureKind::Heat { columns, value_label } => heat(figure, columns, value_label).draw(style),

@@ -51,6 +51,11 @@ impl FigureLook {
         }
     }
 
+    /// Returns the least width and height in mm, rounded up: that of the smallest drawing.
+    pub fn least_mm(self) -> f64 {
+        (Style::MIN_SIDE_PX * self.scale() / PX_PER_MM).ceil()
+    }
+
     /// Returns how much larger lines and marks are than on paper.
     fn scale(self) -> f64 {
         match self {
@@ -74,23 +79,32 @@ pub struct PrintStyle {
 }
 
 impl PrintStyle {
-    /// Draws all figures of a document, numbered in order.
+    /// Draws all figures of a document, numbered in order after `before` others.
     ///
     /// # Errors
     /// When one cannot be drawn at this size.
-    pub fn figures(&self, document: &Document) -> Result<Vec<PrintFigure>, DrawError> {
-        let style = self.style();
+    pub fn figures(
+        &self,
+        document: &Document,
+        before: usize,
+    ) -> Result<Vec<PrintFigure>, DrawError> {
+        let style = self.layout();
         let mut printed = Vec::new();
         for figure in figures(document) {
             let for_print = self.for_print(figure);
             let DrawnChart { svg, .. } = chart::draw_chart(&for_print, &style)?;
-            let svg = enlarged(&svg, self.look.scale());
-            let svg = if self.look == FigureLook::Dark { to_dark(&svg) } else { svg };
-            let stem = format!("{:02}-{}", printed.len() + 1, slug(&figure.title));
-            let file = SvgFile { stem, svg };
-            printed.push(PrintFigure { file, title: figure.title.clone(), csv: for_print.csv() });
+            let number = before + printed.len() + 1;
+            printed.push(self.finish(number, figure.title.clone(), &svg, for_print.csv()));
         }
         Ok(printed)
+    }
+
+    /// Returns a drawing in the layout of this style as a figure with a number.
+    pub fn finish(&self, number: usize, title: String, svg: &str, csv: String) -> PrintFigure {
+        let svg = enlarged(svg, self.look.scale());
+        let svg = if self.look == FigureLook::Dark { to_dark(&svg) } else { svg };
+        let stem = format!("{number:02}-{}", slug(&title));
+        PrintFigure { file: SvgFile { stem, svg }, title, csv }
     }
 
     /// Returns the labels that occur in no figure of a document.
@@ -106,7 +120,7 @@ impl PrintStyle {
     }
 
     /// Returns the size and the text of a layout, which is enlarged afterwards.
-    fn style(&self) -> Style {
+    pub fn layout(&self) -> Style {
         let scale = self.look.scale();
         let [width_px, height_px] = self.size_mm.map(|mm| (mm * PX_PER_MM / scale).round());
         Style { width_px, height_px, font_px: self.font_pt * PX_PER_PT / scale }
@@ -122,6 +136,9 @@ impl PrintStyle {
         }
         for name in figure.position_names_mut() {
             self.replace_label(name);
+        }
+        for words in figure.legend_words_mut() {
+            self.replace_label(words);
         }
         figure
     }
@@ -145,18 +162,21 @@ fn figure_labels(figure: &Figure) -> impl Iterator<Item = &str> {
     let positions = figure.position_names().unwrap_or_default();
     let series = figure.series.iter().map(|series| &series.name);
     let axes = [&figure.x_label, &figure.y_label].into_iter();
-    axes.chain(series).chain(positions).map(String::as_str)
+    axes.chain(series).chain(positions).chain(figure.legend_words()).map(String::as_str)
 }
 
 /// Returns a drawing that is shown larger by a factor, with all its lines.
 fn enlarged(svg: &str, factor: f64) -> String {
-    let Some((_, rest)) = svg.split_once("viewBox=\"0 0 ") else { return svg.to_string() };
-    let Some((size, _)) = rest.split_once('"') else { return svg.to_string() };
-    let Some((width, height)) = size.split_once(' ') else { return svg.to_string() };
-    let own = format!("width=\"{width}\" height=\"{height}\"");
-    let larger = |px: &str| px.parse::<f64>().map_or(0.0, |px| (px * factor).round());
-    let shown = format!("width=\"{}\" height=\"{}\"", larger(width), larger(height));
-    svg.replacen(&own, &shown, 1)
+    let Some((head, rest)) = svg.split_once('>') else { return svg.to_string() };
+    let mut head = head.to_string();
+    for side in ["width", "height"] {
+        let begin = format!(" {side}=\"");
+        let Some((before, after)) = head.split_once(&begin) else { continue };
+        let Some((length, after)) = after.split_once('"') else { continue };
+        let larger = length.parse::<f64>().map_or(0.0, |px| (px * factor).round());
+        head = format!("{before}{begin}{larger}\"{after}");
+    }
+    format!("{head}>{rest}")
 }
 
 #[cfg(test)]
@@ -182,7 +202,7 @@ mod tests {
         let labels = words.map(|(from, to)| (from.into(), to.into())).to_vec();
         let look = FigureLook::Paper;
         let print = PrintStyle { look, size_mm: [127.0, 63.5], font_pt: 9.0, labels };
-        let printed = print.figures(&document).unwrap();
+        let printed = print.figures(&document, 0).unwrap();
         let svg = &printed[0].file.svg;
         assert!(svg.contains(r#"width="480""#) && svg.contains("Number of hits"), "{svg}");
         assert!(svg.contains("Calm sea") && svg.contains("gap (m)") && !svg.contains(">hits<"));
@@ -193,7 +213,7 @@ mod tests {
         );
         assert!(printed[0].csv.starts_with("series,gap (m),Number of hits,low"));
         let dark = PrintStyle { look: FigureLook::Dark, ..print };
-        let svg = &dark.figures(&document).unwrap()[0].file.svg;
+        let svg = &dark.figures(&document, 0).unwrap()[0].file.svg;
         assert!(svg.contains(r#"width="481""#) && !svg.contains("#FFFFFF"), "{svg}");
     }
 }

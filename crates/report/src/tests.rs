@@ -3,7 +3,7 @@
 use super::*;
 use sidestep_document::claim::{Claim, Verdict, verdict_summary};
 use sidestep_document::document::{Picture, Text};
-use sidestep_document::figure::{Point, Scale, SlotStats};
+use sidestep_document::figure::{Point, RunLegend, Scale, SlotStats};
 use sidestep_document::{Figure, FigureKind, Series, Table};
 
 /// Text with the markup of each language.
@@ -54,6 +54,8 @@ fn all_figure_kinds() -> Vec<Figure> {
             slots: vec![SlotStats { mean: Some(2.0), ..SlotStats::default() }],
             is_joined: false,
             has_zero_line: false,
+            has_bars: true,
+            legend: RunLegend::default(),
         },
         FigureKind::Heat { columns: categories, value_label: HOSTILE.into() },
         FigureKind::Front { corners: vec![(0.0, 1.0), (1.0, 1.0)] },

@@ -69,7 +69,7 @@ pub use inspect::{InspectedFile, inspect, write_clean};
 pub use live::{LiveControl, ViewerAddress, ViewerOptions, ViewerServer, next_free_port};
 pub use managed_run::{ManagedRun, OutputPaths, RestoreError};
 pub use pacer::Pacer;
-pub use picture::{png_bytes, write_png};
+pub use picture::{PictureLook, png_bytes, write_png};
 pub use polling::run_polling;
 pub use recorded_run::RecordedRun;
 pub use recorded_series::RecordedSeries;

@@ -3,7 +3,7 @@
 use crate::compare::compare_poses;
 use crate::compare_rows::RowComparison;
 use crate::driver::{RunTiming, Sinks, drive};
-use crate::picture::{draw_svg, footnote, write_png};
+use crate::picture::{PictureLook, draw_svg, footnote, write_png};
 use crate::{Error, RecordedRun, Watcher};
 use sidestep_kernel::shell::sidestep_command;
 use sidestep_kernel::{Cycle, InputError, Simulation};
@@ -118,7 +118,12 @@ impl ReplayReport {
     /// When it cannot be drawn or written.
     pub fn draw(&mut self, recorded: &RecordedRun, png: &Path) -> Result<(), Error> {
         let origin = footnote(self.run.as_ref());
-        let svg = draw_svg(self.run.as_mut(), recorded.folder.as_deref(), &origin)?;
+        let svg = draw_svg(
+            self.run.as_mut(),
+            recorded.folder.as_deref(),
+            &origin,
+            &PictureLook::default(),
+        )?;
         write_png(png, &svg)
     }
 }

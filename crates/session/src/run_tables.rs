@@ -1,7 +1,7 @@
 //! Tables of a recorded run, also as CSV, the format of logs to learn from.
 
 use serde_json::Value;
-use sidestep_draw::bodies_with_trails;
+use sidestep_draw::{TrailChoice, bodies_with_trails};
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 use sidestep_kernel::view::{Frame, PositionTableColumns, Scenery, Trail};
@@ -20,14 +20,17 @@ pub(crate) fn read_trails(
     folder: &Path,
     scenery: &Scenery,
     frame: &Frame,
+    choice: &TrailChoice,
 ) -> Result<Vec<Trail>, InputError> {
-    let whose = bodies_with_trails(scenery, frame);
+    let whose = bodies_with_trails(scenery, frame, choice);
     let mut trails = Vec::new();
     for rows in tables.iter().filter(|rows| has_rows(folder, rows.table)) {
         // Tables have rows of all bodies of a kind, also of those without a trail.
         let here = frame.bodies.iter().filter(|body| body.kind == rows.kind).count();
         let moments = (MAX_TRAIL_ROWS / here.max(whose.len()).max(1) as u64).max(1);
-        let cycles = moments.saturating_mul(rows.interval).min(rows.history);
+        // A chosen part is shown whole, whether it can be read or not.
+        let history = choice.from.map_or(rows.history, |from| frame.cycle.saturating_sub(from));
+        let cycles = moments.saturating_mul(rows.interval).min(history);
         let from = frame.cycle.saturating_sub(cycles);
         let table = read_table(folder, rows.table, from..frame.cycle)?;
         let of_table = rows.trails(scenery, frame, &whose, |name| table.column(name));

@@ -137,6 +137,7 @@ impl WorldView for PondWorld {
             floor: None,
             bodies: (0..).zip(&self.reeds).map(|(number, &pad)| self.reed(number, pad)).collect(),
             names: Vec::new(),
+            groups: Vec::new(),
             earth: Default::default(),
         }
     }

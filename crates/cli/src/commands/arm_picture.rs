@@ -42,6 +42,7 @@ impl ArmPicture<'_> {
             floor: None,
             bodies: self.static_bodies(length_m),
             names: vec![(CONNECTOR, 0, self.robot.into())],
+            groups: Vec::new(),
             earth: Default::default(),
         };
         let frame = Frame { bodies: self.arm(length_m), ..Frame::default() };

@@ -5,18 +5,19 @@ use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::interrupt;
 use crate::scenario_args::WorkersArg;
+use crate::size::PixelSize;
 use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use sidestep::kernel::view::AgentNumber;
 use sidestep::kernel::{Cycle, InputError};
+use sidestep_draw::PictureView;
 use sidestep_record::origins_text;
-use sidestep_server::replay_page::{
-    AgentNumber, CycleWindow, InspectionRequest, PageRequest, PageResult, export_page,
-};
+use sidestep_server::replay_page::{InspectionRequest, PageRequest, PageResult, export_page};
 use sidestep_session::export::{
-    self, AnimationOptions, ExportRequest, ExportResult, ExportScope, Format,
+    self, AnimationOptions, CycleWindow, ExportRequest, ExportResult, ExportScope, Format,
 };
-use sidestep_session::{RecordedRun, display_path};
+use sidestep_session::{PictureLook, RecordedRun, display_path};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -27,7 +28,9 @@ Examples:
   sidestep export runs/hall --to lorr               for PlanViz of the League
   sidestep export runs/office --to rosbag           odometry and scans for ROS 2
   sidestep export runs/reacher --to trajectory      motions of arms for ROS 2
-  sidestep export runs/office --to gif --from 1000 --until 2000
+  sidestep export runs/office --to gif --cycles 1000:2000
+  sidestep export runs/office --to png --agents 1,4,8 --cycles 200:400
+  sidestep export runs/snake --to svg --view front --size 1200x800
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
   sidestep export runs/office --to page --agents 1  one file for any browser
 
@@ -143,12 +146,23 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(64..=4096))]
     width: Option<u16>,
 
-    /// Agents whose percepts, decisions and actions the page holds (page): their numbers, with that of
-    /// a part where one is meant, e.g. 1,8 or 0/17 [default: all in the cycles of --cycles, else none]
+    /// Width and height of pictures in pixels, with all their words, in place of --width
+    #[arg(long, value_name = "WxH")]
+    size: Option<PixelSize>,
+
+    /// Side from which pictures show a run in space: top, side, front, or degrees about the vertical
+    /// and above the horizon, e.g. -60,30 [default: the one that shows the agents best]
+    #[arg(long, value_name = "VIEW", allow_hyphen_values = true)]
+    view: Option<PictureView>,
+
+    /// Agents by their numbers, with that of a part where one is meant, e.g. 1,8 or 0/17: in pictures,
+    /// those with tracks and names, the others pale [default: as many as can be distinguished]; of a
+    /// page, those with percepts, decisions and actions [default: all in --cycles, else none]
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     agents: Vec<AgentNumber>,
 
-    /// Cycles of these percepts, decisions and actions (page) [default: with --agents, all]
+    /// Cycles from A to B: svg and png show the state at B with the tracks since A; a page holds the
+    /// percepts, decisions and actions in them; of all else, the same as --from A --until B
     #[arg(long, value_name = "A:B")]
     cycles: Option<CycleWindow>,
 
@@ -180,7 +194,8 @@ pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Fa
     let watcher = ConsoleWatcher::new(console);
     let result = match export_format(args) {
         Some(form) => {
-            let request = ExportRequest { form, scope: export_scope(args) };
+            let request =
+                ExportRequest { form, look: picture_look(args), scope: export_scope(args) };
             export::export(&recorded, &request, &watcher).map(Exported::from)
         }
         None => export_page(worlds(), &recorded, &page_request(args, beside.as_ref()), &watcher)
@@ -286,12 +301,29 @@ fn export_format(args: &ExportArgs) -> Option<Format> {
     })
 }
 
+fn picture_look(args: &ExportArgs) -> PictureLook {
+    let window = args.cycles.filter(|_| args.to.is_picture());
+    PictureLook {
+        agents: args.agents.clone(),
+        trails_from: window.map(|window| window.from),
+        view: args.view.unwrap_or_default(),
+        size_px: args.size.map(|PixelSize(sides)| sides),
+    }
+}
+
+/// Returns the part of the run, and the place of the export.
 fn export_scope(args: &ExportArgs) -> ExportScope<'_> {
+    let (from, until) = match args.cycles {
+        // A picture has one cycle: that of its state.
+        Some(window) if args.to.is_picture() => (Some(window.until), None),
+        Some(window) if args.to != ExportFormat::Page => (Some(window.from), Some(window.until)),
+        _ => (args.from, args.until),
+    };
     ExportScope {
         out: args.out.as_deref(),
         replace: args.replace,
-        from: args.from,
-        until: args.until,
+        from,
+        until,
         every: args.every,
         workers: args.workers.count(),
     }
@@ -305,15 +337,19 @@ fn page_request<'a>(args: &'a ExportArgs, beside: Option<&'a RecordedRun>) -> Pa
 /// Refuses options that have no effect on the chosen format.
 fn check_options(args: &ExportArgs) -> Result<(), InputError> {
     let format = args.to;
+    let is_seen = format.is_picture() || format.is_animation();
+    let is_page = format == ExportFormat::Page;
     let given = [
         ("--until", args.until.is_some(), !format.is_picture()),
         // The viewer begins at tick 0, and has all ticks.
         ("--from", args.from.is_some(), format != ExportFormat::Lorr),
         ("--every", args.every.is_some(), !format.is_picture() && format != ExportFormat::Lorr),
         ("--table", args.table.is_some(), format.is_table()),
-        ("--agents", !args.agents.is_empty(), format == ExportFormat::Page),
-        ("--cycles", args.cycles.is_some(), format == ExportFormat::Page),
-        ("--beside", args.beside.is_some(), format == ExportFormat::Page),
+        ("--agents", !args.agents.is_empty(), is_seen || is_page),
+        ("--cycles", args.cycles.is_some(), format != ExportFormat::Lorr),
+        ("--beside", args.beside.is_some(), is_page),
+        ("--view", args.view.is_some(), is_seen),
+        ("--size", args.size.is_some(), is_seen),
         ("--fps", args.fps.is_some(), format.is_animation()),
         ("--width", args.width.is_some(), format.is_animation() || format == ExportFormat::Png),
     ];
@@ -322,6 +358,30 @@ fn check_options(args: &ExportArgs) -> Result<(), InputError> {
             let cause = format!("means nothing for --to {}", format.name());
             return Err(InputError::new(option, cause, "leave it out"));
         }
+    }
+    check_pairs(args)
+}
+
+/// Refuses options that say the same in two ways, and sizes that no video has.
+fn check_pairs(args: &ExportArgs) -> Result<(), InputError> {
+    let has_span = args.from.is_some() || args.until.is_some();
+    if args.cycles.is_some() && has_span && args.to != ExportFormat::Page {
+        let cause = "--from and --until give the cycles, too";
+        return Err(InputError::new("--cycles", cause, "leave one of them out"));
+    }
+    if args.size.is_some() && args.width.is_some() {
+        let cause = "--width gives the size, too";
+        return Err(InputError::new("--size", cause, "leave one of them out"));
+    }
+    if let Some(PixelSize(sides)) = args.size
+        && args.to == ExportFormat::Mp4Frames
+        && sides.iter().any(|side| side % 2 == 1)
+    {
+        let [width, height] = sides;
+        let [even_width, even_height] = sides.map(|side| side & !1);
+        let cause = format!("{width}x{height} has an odd side, which no video may have");
+        let remedy = format!("give --size {even_width}x{even_height}");
+        return Err(InputError::new("--size", cause, remedy));
     }
     Ok(())
 }

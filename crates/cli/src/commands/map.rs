@@ -180,6 +180,7 @@ fn draw_boxes(map: &GridMap, file: &Path, png: &Path) -> Result<(), Failure> {
         floor: Some(map.occupancy_grid()),
         bodies: Vec::new(),
         names: Vec::new(),
+        groups: Vec::new(),
         earth: Default::default(),
     };
     let caption = format!("{} x {} boxes of {} m", map.width(), map.height(), map.box_size_m);

@@ -3,17 +3,19 @@
 use crate::console::Console;
 use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
+use crate::fonts::find_fonts;
 use crate::report_files::{PngOutput, ReportFiles};
+use crate::size::parse_sides;
 use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::InputError;
 use sidestep_document::Document;
-use sidestep_draw::{DrawError, Fonts, to_pdf, to_png_with_density};
+use sidestep_draw::{DrawError, Fonts, MAX_PNG_PX, to_pdf, to_png_with_density};
 use sidestep_record::FileSet;
 use sidestep_report::{FigureLook, PrintFigure, PrintStyle};
 use sidestep_session::display_path;
-use sidestep_session::report::document;
+use sidestep_session::report::{document, track_figure};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -66,9 +68,10 @@ struct PrintArgs {
     #[arg(long, value_name = "PT", requires = "forms")]
     figure_font: Option<f64>,
 
-    /// File of the font of their text, .ttf or .otf [default: DejaVu Sans]
-    #[arg(long, value_name = "FILE", requires = "forms")]
-    figure_family: Option<PathBuf>,
+    /// Font of their text: the name of an installed family, or a .ttf or .otf file [default: DejaVu
+    /// Sans]
+    #[arg(long, value_name = "NAME|FILE", requires = "forms")]
+    figure_family: Option<String>,
 
     /// Pixels per inch of PNG
     #[arg(long, value_name = "DPI", default_value_t = 300.0, requires = "forms")]
@@ -82,6 +85,11 @@ struct PrintArgs {
     #[arg(long = "label", value_name = "WORDS=OTHERS", requires = "forms")]
     labels: Vec<String>,
 }
+
+/// The picture of tracks in the folder of a run that has ended.
+const RUN_PICTURE: &str = "trajectories.svg";
+/// Millimeters of an inch.
+const MM_PER_INCH: f64 = 25.4;
 
 /// Formats of figures for print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -129,8 +137,13 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
         check_labels(&print.style, &document)?;
     }
     let mut listed = files.begin()?;
-    let figures =
-        figures.map(|print| args.print.add(&print, &document, &files, &mut listed)).transpose()?;
+    let figures = match figures {
+        Some(print) => {
+            let tracks = tracks(args, &print, console)?;
+            Some(args.print.add(&print, &document, tracks, (&files, &mut listed))?)
+        }
+        None => None,
+    };
     files.add(&mut listed, &document, PngOutput::None)?;
     listed.commit()?;
     let html = files.html.display();
@@ -171,20 +184,41 @@ impl PrintArgs {
             Some(size) => parse_size_mm(size)?,
             None => look.size_mm(),
         };
+        self.check_size(look, size_mm)?;
         let style = PrintStyle { look, size_mm, font_pt, labels };
         Ok(Some(Print { style, fonts: self.fonts()? }))
+    }
+
+    /// Refuses sizes in which nothing has room, and more pixels than a PNG may have.
+    fn check_size(&self, look: FigureLook, size_mm: [f64; 2]) -> Result<(), InputError> {
+        let [width, height] = size_mm;
+        let least_mm = look.least_mm();
+        if width.min(height) < least_mm {
+            let cause = format!("{width}x{height} mm leave no room for text this large");
+            let size = size_mm.map(|mm| mm.max(least_mm));
+            let remedy = format!("give --figure-size {}x{}, or more", size[0], size[1]);
+            return Err(InputError::new("--figure-size", cause, remedy));
+        }
+        if self.forms.contains(&FigureFormat::Png) {
+            let longer_mm = width.max(height);
+            let max_dpi = (f64::from(MAX_PNG_PX) / longer_mm * MM_PER_INCH).floor();
+            if self.figure_dpi > max_dpi {
+                let px = (longer_mm / MM_PER_INCH * self.figure_dpi).round();
+                let cause = format!("{longer_mm} mm at {} DPI are {px} pixels", self.figure_dpi);
+                let remedy = format!("give --figure-dpi {max_dpi}, or a smaller --figure-size");
+                return Err(InputError::new("--figure-dpi", cause, remedy));
+            }
+        }
+        Ok(())
     }
 
     /// Returns the fonts of the figures.
     ///
     /// # Errors
-    /// When the file cannot be read, or is no font.
+    /// When no font has the name, or the file is no font.
     fn fonts(&self) -> Result<Fonts, InputError> {
-        let Some(file) = &self.figure_family else { return Ok(Fonts::default()) };
-        let remedy = "give a font file: fc-list shows those of this machine";
-        let wrong = |cause: String| InputError::new(file.display(), cause, remedy);
-        let bytes = std::fs::read(file).map_err(|error| wrong(error.to_string()))?;
-        Fonts::from_file_bytes(bytes).map_err(|error| wrong(error.to_string()))
+        let Some(family) = &self.figure_family else { return Ok(Fonts::default()) };
+        find_fonts(family)
     }
 
     /// Adds the figures beside the page, and returns their folder.
@@ -195,11 +229,13 @@ impl PrintArgs {
         &self,
         print: &Print,
         document: &Document,
-        files: &ReportFiles,
-        listed: &mut FileSet,
+        tracks: Option<PrintFigure>,
+        (files, listed): (&ReportFiles, &mut FileSet),
     ) -> Result<PathBuf, Failure> {
         let folder = format!("{}-print", files.stem());
-        for figure in print.style.figures(document)? {
+        let before = usize::from(tracks.is_some());
+        let figures = print.style.figures(document, before)?;
+        for figure in tracks.into_iter().chain(figures) {
             let place = format!("{folder}/{}", figure.file.stem);
             for (ending, bytes) in self.figure_files(print, &figure)? {
                 listed.stage_bytes::<Failure>(&format!("{place}.{ending}"), &bytes)?;
@@ -235,6 +271,23 @@ impl PrintArgs {
     }
 }
 
+/// Returns the tracks of a run as its first figure; none of a sweep, and of a run of which no picture could be drawn.
+///
+/// # Errors
+/// When the run is damaged, or the size leaves no room.
+fn tracks(
+    args: &ReportArgs,
+    print: &Print,
+    console: Console,
+) -> Result<Option<PrintFigure>, Failure> {
+    if !args.folder.join(RUN_PICTURE).is_file() {
+        return Ok(None);
+    }
+    let watcher = ConsoleWatcher::new(console);
+    let tracks = track_figure(worlds(), &args.folder, &print.style.layout(), &watcher)?;
+    Ok(Some(print.style.finish(1, tracks.title, &tracks.svg, tracks.csv)))
+}
+
 /// Takes `n=4=four` apart where a figure has the words `n=4`, rather than at the first sign.
 fn split_at_known_labels(labels: &mut [(String, String)], document: &Document) {
     let known = PrintStyle::document_labels(document);
@@ -266,18 +319,11 @@ fn check_labels(print: &PrintStyle, document: &Document) -> Result<(), InputErro
 
 /// Parses width and height in mm.
 fn parse_size_mm(text: &str) -> Result<[f64; 2], InputError> {
-    let sides: Vec<Option<f64>> = text.split('x').map(|side| side.trim().parse().ok()).collect();
-    match sides[..] {
-        [Some(width), Some(height)]
-            if [width, height].iter().all(|mm| (30.0..=500.0).contains(mm)) =>
-        {
-            Ok([width, height])
-        }
-        _ => {
-            let cause = format!("`{text}` is no size");
-            Err(InputError::new("--figure-size", cause, "write WxH, 30 to 500 mm each: 85x60"))
-        }
-    }
+    let sides = parse_sides(text);
+    sides.filter(|sides| sides.iter().all(|mm| (30.0..=500.0).contains(mm))).ok_or_else(|| {
+        let cause = format!("`{text}` is no size");
+        InputError::new("--figure-size", cause, "write WxH, 30 to 500 mm each: 85x60")
+    })
 }
 
 /// Parses `WORDS=OTHERS`, for now at the first sign.

@@ -11,6 +11,8 @@ use crate::text::{self, Weight};
 
 /// Height of a line of a row as a multiple of the size of its text.
 const LINE: f64 = 1.5;
+/// Height of a line of text that is broken, as a multiple of its size.
+const TEXT_LINE: f64 = 1.2;
 /// Gap between the area and the text beside it.
 const TEXT_GAP_PX: f64 = 10.0;
 /// Radius of a mark as a multiple of the size of small text.
@@ -20,7 +22,8 @@ const MARK_FRACTION: f64 = 0.42;
 const MAX_SPREAD: f64 = 3.0;
 /// Reach of the axis beyond the largest effects.
 const MARGIN: f64 = 1.04;
-/// Largest fraction of the width for the names of rows and the text together; without that room the text is left out.
+/// Largest fraction of the width for the names of rows and the text together; text that needs more is broken, and left
+/// out only where a word alone needs more.
 const MAX_WORDS_FRACTION: f64 = 0.68;
 
 /// An effect in one row.
@@ -96,7 +99,7 @@ impl ForestChart {
         let limit = self.limit();
         // A little more, so that no mark sits on the frame.
         let shown = self.ends().map(|end| MARGIN * end.clamp(-limit, limit));
-        let beside_px = self.beside_px(style);
+        let beside = self.beside(style);
         // The axis has less room than that of other charts.
         let across = max_ticks(&Style { width_px: 0.55 * style.width_px, ..*style }).0;
         let x = self.x.fit(shown.chain([0.0]), across)?;
@@ -105,8 +108,8 @@ impl ForestChart {
             note: &self.note,
             x_label: self.x.label(),
             legend: self.legend(),
-            beside_px,
-            rows_px: self.rows.len() as f64 * self.row_px(style),
+            beside_px: beside.width_px,
+            rows_px: self.rows.len() as f64 * self.row_px(style, beside.max_lines()),
             ..FrameText::default()
         };
         let rows = crate::axis::FittedAxis::rows(&self.rows);
@@ -122,14 +125,14 @@ impl ForestChart {
             format_args!(r#"stroke="{INK}" stroke-width="1.2""#),
         );
         for index in 0..self.series.len() {
-            self.draw_series(&mut frame, x_scale, index, (style, beside_px > 0.0));
+            self.draw_series(&mut frame, x_scale, index, (style, &beside));
         }
         Ok(frame.finish())
     }
 
-    /// Returns the number of lines of a row: names of quantities may take two.
-    fn row_px(&self, style: &Style) -> f64 {
-        let lines = self.series.len().max(1) as f64 + 0.6;
+    /// Returns the height of a row: names of quantities may take two lines, and each effect some of text.
+    fn row_px(&self, style: &Style, text_lines: usize) -> f64 {
+        let lines = self.series.len().max(1) as f64 * lines_of_effect(text_lines) + 0.6;
         lines.max(2.0) * LINE * style.small_px()
     }
 
@@ -155,15 +158,32 @@ impl ForestChart {
         if third_quartile > 0.0 { MAX_SPREAD * third_quartile } else { f64::INFINITY }
     }
 
-    /// Returns the room for the text beside the effects; 0 if it is left out.
-    fn beside_px(&self, style: &Style) -> f64 {
-        let width = |text: &String| text::width(text, style.small_px(), Weight::Regular);
-        let widest = self.marks().map(|mark| width(&mark.text)).fold(0.0, f64::max);
+    /// Returns the text beside the effects, broken to fit; none where a word alone is too long.
+    fn beside(&self, style: &Style) -> BesideText {
+        let size = style.small_px();
+        let width = |text: &str| text::width(text, size, Weight::Regular);
         // Names that are longer are broken.
         let max_name = MAX_TICK_LABEL_FRACTION * style.width_px;
-        let names = self.rows.iter().map(width).fold(0.0, f64::max).min(max_name);
-        let fits = widest > 0.0 && widest + names <= MAX_WORDS_FRACTION * style.width_px;
-        if fits { widest + TEXT_GAP_PX } else { 0.0 }
+        let names = self.rows.iter().map(|row| width(row)).fold(0.0, f64::max).min(max_name);
+        let room = MAX_WORDS_FRACTION * style.width_px - names;
+        let mut lines = Vec::with_capacity(self.series.len());
+        for series in &self.series {
+            let of_mark = |mark: &ForestMark| {
+                if width(&mark.text) <= room {
+                    return vec![mark.text.clone()];
+                }
+                text::wrap(&bound_words(&mark.text), size, Weight::Regular, room)
+            };
+            lines.push(series.marks.iter().map(of_mark).collect::<Vec<_>>());
+        }
+        let all = lines.iter().flatten().flatten();
+        // A line that was cut off would be a wrong number.
+        if all.clone().any(|line| line.contains('\u{2026}')) {
+            return BesideText::default();
+        }
+        let widest = all.map(|line| width(line)).fold(0.0, f64::max);
+        let width_px = if widest > 0.0 { widest + TEXT_GAP_PX } else { 0.0 };
+        BesideText { lines, width_px }
     }
 
     /// A single series needs no legend.
@@ -184,17 +204,21 @@ impl ForestChart {
         frame: &mut ChartFrame,
         x: Scale,
         index: usize,
-        (style, has_text): (&Style, bool),
+        (style, beside): (&Style, &BesideText),
     ) {
         let size = style.small_px();
-        let aside = (index as f64 - (self.series.len() as f64 - 1.0) / 2.0) * LINE * size;
+        let effect_px = lines_of_effect(beside.max_lines()) * LINE * size;
+        let aside = (index as f64 - (self.series.len() as f64 - 1.0) / 2.0) * effect_px;
         let color = series_color(index);
         let text_style = TextStyle { fill: INK, ..TextStyle::new(size, Anchor::Start) };
         for (row, mark) in self.series[index].marks.iter().enumerate() {
             let y = frame.y.px(self.rows.len() as f64 - 0.5 - row as f64) + aside;
             let text_x = frame.area.right() + TEXT_GAP_PX;
-            if has_text {
-                frame.svg.text(text_x, y + text_style.middle_px(), &mark.text, &text_style);
+            let lines = beside.lines.get(index).map_or(&[][..], |marks| &marks[row]);
+            let first = y - 0.5 * (lines.len().max(1) - 1) as f64 * TEXT_LINE * size;
+            for (k, line) in lines.iter().enumerate() {
+                let baseline = first + k as f64 * TEXT_LINE * size + text_style.middle_px();
+                frame.svg.text(text_x, baseline, line, &text_style);
             }
             if mark.value.is_finite() {
                 let place = MarkPlace { x, y, radius: MARK_FRACTION * size };
@@ -204,6 +228,43 @@ impl ForestChart {
             }
         }
     }
+}
+
+/// The text beside the effects.
+#[derive(Debug, Default)]
+struct BesideText {
+    /// The lines of each effect, series by series and row by row; empty if they are left out.
+    lines: Vec<Vec<Vec<String>>>,
+    width_px: f64,
+}
+
+impl BesideText {
+    fn max_lines(&self) -> usize {
+        self.lines.iter().flatten().map(Vec::len).max().unwrap_or(0)
+    }
+}
+
+/// Returns the height of an effect in lines of rows, whose text has some lines of its own.
+fn lines_of_effect(text_lines: usize) -> f64 {
+    (text_lines as f64 * TEXT_LINE / LINE).max(1.0)
+}
+
+/// Returns a text that is broken before an interval and before a p-value, but not within one.
+fn bound_words(text: &str) -> String {
+    const NO_BREAK: &str = "\u{a0}";
+    let mut bound = String::new();
+    let mut is_in_interval = false;
+    for word in text.split(' ') {
+        let is_relation = matches!(word, "=" | "<");
+        let follows_relation = bound.ends_with('=') || bound.ends_with('<');
+        let gap = if is_in_interval || is_relation || follows_relation { NO_BREAK } else { " " };
+        if !bound.is_empty() {
+            bound += gap;
+        }
+        bound += word;
+        is_in_interval = (is_in_interval || word.starts_with('[')) && !word.contains(']');
+    }
+    bound
 }
 
 /// Least height that a style may have: the rows decide.
@@ -283,11 +344,21 @@ mod tests {
     }
 
     #[test]
-    fn words_beside_the_effects_are_left_out_where_they_have_no_room() {
+    fn words_beside_the_effects_are_broken_where_they_have_no_room() {
         let long = "+5.0 [4.0, 6.0], p = 0.0003";
         let narrow = Style { width_px: 240.0, ..Style::CHART };
-        let svg = chart([1.0, 2.0, 3.0, 4.0], long).draw(&narrow).unwrap().svg;
-        assert!(!svg.contains(long) && svg.contains("difference"), "{svg}");
+        let draw = |text: &str| chart([1.0, 2.0, 3.0, 4.0], text).draw(&narrow).unwrap().svg;
+        let svg = draw(long);
+        let count = |words: &str| svg.matches(&format!(">{words}</text>")).count();
+        assert_eq!(count("+5.0 [4.0,\u{a0}6.0],") + count("[4.0,\u{a0}6.0],"), 4, "{svg}");
+        assert_eq!(count("p\u{a0}=\u{a0}0.0003"), 4, "{svg}");
+        let word = "antidisestablishmentarianism";
+        assert!(!draw(word).contains("antidis"), "a word that has no room is left out");
+    }
+
+    #[test]
+    fn a_chart_needs_an_effect_for_each_row() {
+        let narrow = Style { width_px: 240.0, ..Style::CHART };
         let short = ForestChart::new("T", Axis::linear(""), ["a"])
             .series(ForestSeries { label: String::new(), marks: vec![] });
         assert!(short.draw(&narrow).is_err());

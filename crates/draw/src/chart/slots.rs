@@ -50,6 +50,9 @@ pub struct SlotChart {
     slots: Vec<Slot>,
     is_joined: bool,
     has_zero_line: bool,
+    has_bars: bool,
+    seed_label: String,
+    mean_label: String,
 }
 
 impl SlotChart {
@@ -63,6 +66,9 @@ impl SlotChart {
             slots,
             is_joined: false,
             has_zero_line: false,
+            has_bars: false,
+            seed_label: "one seed".into(),
+            mean_label: "mean, 95 % interval".into(),
         }
     }
 
@@ -77,6 +83,21 @@ impl SlotChart {
     #[must_use]
     pub fn zero_line(mut self) -> Self {
         self.has_zero_line = true;
+        self
+    }
+
+    /// Draws bars from zero to the means, as counts need them.
+    #[must_use]
+    pub fn bars(mut self) -> Self {
+        self.has_bars = true;
+        self
+    }
+
+    /// Sets what the legend calls a line of a seed, and a mean with its interval.
+    #[must_use]
+    pub fn legend_words(mut self, seed: impl Into<String>, mean: impl Into<String>) -> Self {
+        self.seed_label = seed.into();
+        self.mean_label = mean.into();
         self
     }
 
@@ -136,7 +157,7 @@ impl SlotChart {
             [low, mean, high]
         });
         let boxes = self.slots.iter().filter_map(|slot| slot.quartiles);
-        let zero = self.has_zero_line.then_some(0.0);
+        let zero = (self.has_zero_line || self.has_bars).then_some(0.0);
         values.chain(means).chain(boxes.flat_map(|quartiles| quartiles.whiskers)).chain(zero)
     }
 
@@ -144,11 +165,11 @@ impl SlotChart {
         let mut entries = Vec::new();
         if self.is_joined {
             let symbol = LegendSymbol::Line { color: FAINT_INK.into(), marker: None, dash: "" };
-            entries.push(LegendEntry::new(symbol, "one seed"));
+            entries.push(LegendEntry::new(symbol, &self.seed_label));
         }
         if self.slots.iter().any(|slot| slot.mean.is_some()) {
             let symbol = LegendSymbol::Marker { color: INK.into(), marker: Marker::Diamond };
-            entries.push(LegendEntry::new(symbol, "mean, 95 % interval"));
+            entries.push(LegendEntry::new(symbol, &self.mean_label));
         }
         entries
     }
@@ -179,6 +200,11 @@ impl SlotChart {
     fn draw_slot(&self, frame: &mut ChartFrame, place: &SlotPlace, index: usize) {
         let slot = &self.slots[index];
         let color = series_color(index);
+        if self.has_bars
+            && let Some((mean, _)) = slot.mean
+        {
+            place.draw_bar(frame, mean, &color);
+        }
         if let Some(quartiles) = &slot.quartiles {
             place.draw_box(frame, quartiles, &color);
         }
@@ -230,6 +256,19 @@ impl SlotPlace {
 
     fn box_width(&self) -> f64 {
         (BOX_FRACTION * self.width).min(MAX_BOX_PX)
+    }
+
+    /// Draws a bar from zero, pale so that the runs on it are seen.
+    fn draw_bar(&self, frame: &mut ChartFrame, mean: f64, color: &str) {
+        let width = self.box_width();
+        let base = frame.y.px(0.0);
+        let top = frame.y.px(mean);
+        let x = self.center - 0.5 * width;
+        let bar = Rect { x, y: base.min(top), width, height: (base - top).abs() };
+        let rim = format!(r#"stroke="{color}" stroke-width="1.2""#);
+        frame
+            .svg
+            .rect(bar, format_args!(r#"class="bar" fill="{color}" fill-opacity="0.25" {rim}"#));
     }
 
     fn draw_box(&self, frame: &mut ChartFrame, quartiles: &QuartileBox, color: &str) {

@@ -2,15 +2,17 @@
 
 use std::fmt::Write as _;
 
-use super::Scene;
 use super::canvas::{Canvas, Px, corners};
+use super::palette::pale;
+use super::surroundings::SeenAgents;
+use super::{AgentEmphasis, Scene};
 use crate::legend::{leader_mark, target_mark};
 use crate::style::{INK, hex};
 use crate::svg::{Anchor, Svg, SvgNumber, TextStyle};
 use sidestep_kernel::geometry::dot;
 use sidestep_kernel::view::{
-    Body, BodyCondition, BodyKind, BodyRole, Color, Outline, Pose, Scenery, Shape, Vec3,
-    WALL_COLOR, body_color,
+    Body, BodyCondition, BodyKind, BodyRole, Color, Outline, Paint, Pose, Scenery, Shape, Vec3,
+    WALL_COLOR,
 };
 
 /// Least width of a line, because thinner ones would vanish.
@@ -36,13 +38,15 @@ const MIN_SEAMED_PX: f64 = 8.0;
 const MAX_SEPARATE_BALLS: usize = 400;
 /// Shades of such balls: with one path for each, their number decides the bytes.
 const SHADES: f64 = 16.0;
+/// The light on a ball: discs, by their distance aside and their radius in radii of the ball.
+const LIGHTS: [[f64; 2]; 3] = [[0.16, 0.72], [0.25, 0.46], [0.33, 0.2]];
 /// Round, because the segments of a line are drawn one by one in space and must join without a notch.
 const LINE_ATTRIBUTES: &str = r#"fill="none" stroke-linecap="round" stroke-linejoin="round""#;
 /// Duration of the movement that a body's arrow shows, in seconds.
 const ARROW_TIME_S: f64 = 1.0;
 /// Corners of a circle that is seen from the side.
 const CORNERS: usize = 32;
-/// Color of agents without a trail, if others have one.
+/// Color of agents without a trail, if others have one and agents have colors of their own.
 const UNTRACED_COLOR: Color = [0x22, 0x22, 0x22];
 /// Gray level toward which distant things in space fade.
 const FAR_GRAY: f64 = 215.0;
@@ -94,14 +98,9 @@ struct DepthItem<'a> {
 }
 
 /// Draws bodies in space, far ones first; a line with many points is drawn part by part.
-pub(super) fn draw_by_depth<'a>(
-    svg: &mut Svg,
-    scene: &Scene<'_>,
-    canvas: &Canvas,
-    bodies: impl Iterator<Item = &'a Body>,
-) {
+pub(super) fn draw_by_depth(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     let mut parts: Vec<DepthItem<'_>> = Vec::new();
-    for body in bodies {
+    for body in scene.visible() {
         match &body.shape {
             Shape::Line { points_m, .. } => {
                 for (k, pair) in points_m.windows(2).enumerate() {
@@ -114,11 +113,17 @@ pub(super) fn draw_by_depth<'a>(
     }
     // The sort is stable: of bodies at the same depth, the one that comes first is drawn first.
     parts.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
-    let are_many = parts.iter().filter(|part| is_ball(part.body)).count() > MAX_SEPARATE_BALLS;
+    let balls = scene.surroundings.balls();
+    let are_many = balls.len() > MAX_SEPARATE_BALLS;
+    let agents = SeenAgents::new(scene.frame, canvas);
     svg.push_raw(format_args!(r#"<g class="parts" {LINE_ATTRIBUTES}>"#));
     for alike in parts.chunk_by(|a, b| are_many && are_like_balls(canvas, a.body, b.body)) {
         match alike {
             [first, ..] if are_many && is_ball(first.body) => draw_dots(svg, canvas, alike),
+            [first, ..] if is_ball(first.body) => {
+                let hides = agents.are_behind(first.body, canvas);
+                draw_ball(svg, canvas, first.body, hides);
+            }
             _ => alike.iter().for_each(|part| draw_part(svg, scene, canvas, part)),
         }
     }
@@ -139,12 +144,42 @@ fn is_ball(body: &Body) -> bool {
     body.kind == BodyKind::OBSTACLE && matches!(body.shape, Shape::Sphere { .. })
 }
 
+/// Returns the color of a ball: paler with distance, in few shades.
+fn ball_color(canvas: &Canvas, body: &Body) -> Color {
+    let shade = (canvas.nearness(body.pose.at_m) * SHADES).round() / SHADES;
+    paler(body.appearance(3).color, shade)
+}
+
+/// Draws a ball with light on it; one that hides an agent lets it show through.
+fn draw_ball(svg: &mut Svg, canvas: &Canvas, body: &Body, hides: bool) {
+    let Shape::Sphere { radius_m } = body.shape else { return };
+    let color = ball_color(canvas, body);
+    let rim = format!(r#"stroke="{}""#, hex(darker(color)));
+    let fill = hex(color);
+    let (x, y) = canvas.px(body.pose.at_m);
+    let radius_px = (radius_m * canvas.px_per_m).max(MIN_RADIUS_PX);
+    if hides {
+        let faint = r#"fill-opacity="0.08" stroke-opacity="0.5" stroke-width="0.7""#;
+        return svg.circle(
+            (x, y),
+            radius_px,
+            format_args!(r#"class="hides" fill="{fill}" {rim} {faint}"#),
+        );
+    }
+    let thin = r#"stroke-opacity="0.6" stroke-width="0.6""#;
+    svg.circle((x, y), radius_px, format_args!(r#"class="ball" fill="{fill}" {rim} {thin}"#));
+    // Discs rather than a gradient, which PDF files of ours do not have.
+    for [aside, size] in LIGHTS {
+        let center = (x - aside * radius_px, y - aside * radius_px);
+        svg.circle(center, size * radius_px, r##"fill="#FFFFFF" fill-opacity="0.22""##);
+    }
+}
+
 /// Returns the attributes of a ball among many.
 fn dot_attributes(canvas: &Canvas, body: &Body) -> String {
     let radius_m = if let Shape::Sphere { radius_m } = body.shape { radius_m } else { 0.0 };
     let appearance = body.appearance(3);
-    let shade = (canvas.nearness(body.pose.at_m) * SHADES).round() / SHADES;
-    let color = hex(paler(appearance.color, shade));
+    let color = hex(ball_color(canvas, body));
     let opacity = appearance.opacity;
     let width = SvgNumber(2.0 * (radius_m * canvas.px_per_m).max(MIN_RADIUS_PX));
     format!(r#"stroke="{color}" stroke-opacity="{opacity}" stroke-width="{width}""#)
@@ -173,11 +208,9 @@ fn depth(canvas: &Canvas, at: Vec3) -> f64 {
 /// Returns the color of a body, paler with distance in space, and its opacity.
 fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
     let appearance = body.appearance(scene.scenery.dimensions);
-    if body.kind.is_of_agent()
-        && matches!(body.state, BodyCondition::Plain | BodyCondition::Leading)
-        && scene.lacks_trail(body)
-    {
-        return (UNTRACED_COLOR, appearance.opacity);
+    let is_plain = matches!(body.state, BodyCondition::Plain | BodyCondition::Leading);
+    if is_plain && let Some(color) = agent_color(scene, body) {
+        return (color, appearance.opacity);
     }
     if body.kind == BodyKind::OBSTACLE && !canvas.is_above() {
         let color = paler(appearance.color, canvas.nearness(body.pose.at_m));
@@ -186,11 +219,19 @@ fn fill(scene: &Scene<'_>, canvas: &Canvas, body: &Body) -> (Color, f64) {
     (appearance.color, appearance.opacity)
 }
 
-impl Scene<'_> {
-    /// Returns whether others have a trail and this body has none.
-    fn lacks_trail(&self, body: &Body) -> bool {
-        !self.trails.is_empty() && self.trails.iter().all(|trail| trail.of.number != body.number)
-    }
+/// Returns the color of an agent in plain condition, or of what belongs to it; none for what has a color by its kind.
+fn agent_color(scene: &Scene<'_>, body: &Body) -> Option<Color> {
+    let own = match body.kind.spec().paint {
+        Paint::ByNumber { .. } | Paint::Veil => scene.palette.color(body),
+        _ => return None,
+    };
+    let color = match scene.emphasis(body.number) {
+        AgentEmphasis::Full => own,
+        AgentEmphasis::Context => pale(own),
+        AgentEmphasis::Untraced if body.kind.is_of_agent() => UNTRACED_COLOR,
+        AgentEmphasis::Untraced => own,
+    };
+    Some(color)
 }
 
 fn paler(color: Color, nearness: f64) -> Color {
@@ -213,7 +254,7 @@ fn are_like_balls(canvas: &Canvas, a: &Body, b: &Body) -> bool {
     is_ball(a) && is_ball(b) && dot_attributes(canvas, a) == dot_attributes(canvas, b)
 }
 
-fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
+fn rim(scene: &Scene<'_>, canvas: &Canvas, body: &Body, color: Color) -> String {
     let white = [0xFF; 3];
     match body.kind.spec().outline {
         Outline::Shade if body.state == BodyCondition::Open => {
@@ -226,6 +267,9 @@ fn rim(canvas: &Canvas, body: &Body, color: Color) -> String {
         }
         Outline::Pale => format!(r#"{} stroke-opacity="0.6""#, outline_attributes(color, 0.8)),
         Outline::Dashed => format!(r#"{} stroke-dasharray="5 3""#, outline_attributes(color, 1.0)),
+        Outline::Dark if scene.emphasis(body.number) == AgentEmphasis::Context => {
+            outline_attributes(darker(color), 0.5)
+        }
         Outline::Dark => outline_attributes(UNTRACED_COLOR, 0.8),
         Outline::White => outline_attributes(white, 0.6),
         Outline::Seam if canvas.is_above() => outline_attributes(white, 0.6),
@@ -248,7 +292,7 @@ fn is_seamed(canvas: &Canvas, body: &Body) -> bool {
 fn draw_body(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, body: &Body) {
     let (color, opacity) = fill(scene, canvas, body);
     let hides = if opacity < 1.0 { format!(r#" fill-opacity="{opacity}""#) } else { String::new() };
-    let attributes = format!(r#"fill="{}"{hides} {}"#, hex(color), rim(canvas, body, color));
+    let attributes = format!(r#"fill="{}"{hides} {}"#, hex(color), rim(scene, canvas, body, color));
     match &body.shape {
         Shape::Line { points_m, .. } => draw_line(svg, scene, canvas, body, points_m),
         Shape::Cuboid { size_m } => {
@@ -309,7 +353,8 @@ fn draw_heading(svg: &mut Svg, canvas: &Canvas, body: &Body) {
 
 /// Draws marks over everything: the targets of moving things, and the leaders.
 pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
-    let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
+    let bodies = scene.visible();
+    let bodies = bodies.iter().copied();
     for body in bodies.clone().filter(|body| body.kind == BodyKind::OBSTACLE && body.is_moving()) {
         let from = middle(body);
         let to = std::array::from_fn(|k| from[k] + ARROW_TIME_S * body.velocity_m_s[k]);
@@ -318,7 +363,7 @@ pub(super) fn draw_marks(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     let goals: Vec<&Body> = bodies.clone().filter(|body| is_target(body)).collect();
     let are_few = goals.len() <= MAX_NUMBERED_TARGETS;
     for goal in goals {
-        draw_target(svg, canvas, goal, goal.part.filter(|_| are_few).map(|part| part + 1));
+        draw_target(svg, scene, canvas, goal, goal.part.filter(|_| are_few).map(|part| part + 1));
     }
     for body in bodies.filter(|body| is_leader(body)) {
         if let Shape::Sphere { radius_m } = body.shape {
@@ -340,12 +385,18 @@ pub(super) fn is_leader(body: &Body) -> bool {
 }
 
 /// Draws a target over everything that hides it: a ring with a cross, and its number if there are few.
-fn draw_target(svg: &mut Svg, canvas: &Canvas, goal: &Body, number: Option<u32>) {
+fn draw_target(
+    svg: &mut Svg,
+    scene: &Scene<'_>,
+    canvas: &Canvas,
+    goal: &Body,
+    number: Option<u32>,
+) {
     let Shape::Sphere { radius_m } = goal.shape else { return };
     let (x, y) = canvas.px(goal.pose.at_m);
     let radius_px = (radius_m * canvas.px_per_m).max(MIN_GOAL_PX);
     let reach = radius_px + TARGET_PX;
-    target_mark(svg, (x, y), [radius_px, reach], &hex(darker(body_color(goal.number))));
+    target_mark(svg, (x, y), [radius_px, reach], &hex(darker(scene.palette.color(goal))));
     if let Some(number) = number {
         let words = TextStyle { halo: true, ..TextStyle::new(TARGET_LETTERS_PX, Anchor::Start) };
         svg.text(x + reach, y - radius_px, &number.to_string(), &words);

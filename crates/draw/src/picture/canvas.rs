@@ -23,6 +23,12 @@ impl Camera {
     /// View from above: x to the right, y up.
     pub(crate) const ABOVE: Self =
         Self { right: [1.0, 0.0, 0.0], up: [0.0, 1.0, 0.0], to_eye: [0.0, 0.0, 1.0] };
+    /// View from the end of the x axis: y to the right, z up.
+    pub(crate) const SIDE: Self =
+        Self { right: [0.0, 1.0, 0.0], up: [0.0, 0.0, 1.0], to_eye: [1.0, 0.0, 0.0] };
+    /// View from the beginning of the y axis: x to the right, z up.
+    pub(crate) const FRONT: Self =
+        Self { right: [1.0, 0.0, 0.0], up: [0.0, 0.0, 1.0], to_eye: [0.0, -1.0, 0.0] };
     /// View from a corner: 37 degrees about the vertical and 37 degrees above the horizon, in
     /// numbers that doubles hold almost exactly.
     pub(crate) const CORNER: Self =
@@ -62,13 +68,22 @@ pub(crate) struct Canvas {
     pub(crate) origin_m: [f64; 2],
     /// The nearest and the farthest depth.
     pub(crate) depths_m: [f64; 2],
+    /// Whether it shows things that all lie in a plane.
+    pub(crate) is_plane: bool,
 }
 
 impl Canvas {
     /// Returns a view from above; `lo_m` is in the lower left corner of `map`.
     pub(crate) fn above(lo_m: [f64; 2], px_per_m: f64, map: Rect) -> Self {
         let zero = (map.x, map.bottom());
-        Self { camera: Camera::ABOVE, px_per_m, zero, origin_m: lo_m, depths_m: [0.0, 1.0] }
+        Self {
+            camera: Camera::ABOVE,
+            px_per_m,
+            zero,
+            origin_m: lo_m,
+            depths_m: [0.0, 1.0],
+            is_plane: true,
+        }
     }
 
     pub(crate) fn px(&self, place: Vec3) -> Px {
@@ -82,8 +97,9 @@ impl Canvas {
         (length_m * self.px_per_m).clamp(-MAX_OFFSET_PX, MAX_OFFSET_PX)
     }
 
+    /// Returns whether things that lie in a plane are seen from above, each on top of those of lower layers.
     pub(crate) fn is_above(&self) -> bool {
-        self.camera == Camera::ABOVE
+        self.is_plane
     }
 
     pub(crate) fn nearness(&self, place: Vec3) -> f64 {
@@ -98,7 +114,9 @@ mod tests {
 
     #[test]
     fn the_directions_are_perpendicular_and_one_long() {
-        for Camera { right, up, to_eye } in [Camera::ABOVE, Camera::CORNER] {
+        let turned = Camera::from_angles(2.5, -0.7);
+        let all = [Camera::ABOVE, Camera::SIDE, Camera::FRONT, Camera::CORNER, turned];
+        for Camera { right, up, to_eye } in all {
             for (a, b, expected) in [
                 (right, right, 1.0),
                 (up, up, 1.0),

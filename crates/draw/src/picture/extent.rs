@@ -17,6 +17,9 @@ const MARGIN_FRACTION: f64 = 0.03;
 /// Least length of a side, as a fraction of the longest: bodies in a row would otherwise make a picture of no height.
 const MIN_SIDE_FRACTION: f64 = 0.2;
 
+/// The lower and the upper corner of a box in meters.
+pub(super) type BoxM = [Vec3; 2];
+
 /// Returns the number of points that a body is drawn with, which limits the size of a picture.
 fn point_count(body: &Body) -> usize {
     match &body.shape {
@@ -111,8 +114,7 @@ pub(super) fn scene_bounds(scene: &Scene<'_>) -> Result<[Vec3; 2], DrawError> {
         return Ok(floor_bounds(floor));
     }
     let mut bounds = BoundingBox::default();
-    let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
-    bodies.for_each(|body| bounds.include_body(body));
+    scene.visible().into_iter().for_each(|body| bounds.include_body(body));
     let places = scene.trails.iter().flat_map(|trail| trail.points);
     places.for_each(|(_, at)| bounds.include(*at, 0.0));
     bounds.with_margin()

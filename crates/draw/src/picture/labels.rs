@@ -67,9 +67,8 @@ pub(super) fn draw(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, area: Rect
 }
 
 /// Returns the rectangles of bodies that no name may cover.
-fn body_rects(scene: &Scene<'_>, canvas: &Canvas) -> impl Iterator<Item = Rect> {
-    let bodies = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
-    let kept_free = bodies.filter(|body| {
+fn body_rects<'a>(scene: &Scene<'a>, canvas: &'a Canvas) -> impl Iterator<Item = Rect> + use<'a> {
+    let kept_free = scene.visible().into_iter().filter(|body| {
         body.kind.is_agent()
             || matches!(body.kind.role(), BodyRole::MovesAmong(_) | BodyRole::StartOf(_))
             || body.kind == BodyKind::GOAL

@@ -2,8 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::trails::agents;
-use super::{Scene, bodies};
+use super::palette::pale;
+use super::trails::{TrailChoice, agents};
+use super::{AgentEmphasis, Scene, bodies};
 use crate::legend::{LegendEntry, LegendSymbol};
 use crate::style::{body_dashes, hex};
 use crate::ticks::group_thousands;
@@ -20,23 +21,33 @@ const ANY_COLOR: [u8; 3] = [0x70, 0x70, 0x70];
 const RIBBON_OPACITY: f64 = 0.5;
 
 /// Describes the content of a picture in a sentence; empty if there are no agents.
-pub fn describe(scenery: &Scenery, frame: &Frame, trails: &[Trail]) -> String {
+pub fn describe(
+    scenery: &Scenery,
+    frame: &Frame,
+    trails: &[Trail],
+    choice: &TrailChoice,
+) -> String {
     let agents = agents(scenery, frame);
     let Some((kind, _)) = agents.first() else { return String::new() };
-    let scene = Scene::new(scenery, frame, trails);
+    let scene = Scene::new(scenery, frame, trails, choice);
     let with_trail: BTreeSet<u32> = scene.trails.iter().map(|trail| trail.of.number).collect();
     let first_cycle = scene.trails.first().map_or(0, |trail| trail.span[0]);
     let all = agents.len();
     let plural = plural(*kind, all);
     let from = group_thousands(&first_cycle.to_string());
     let to = group_thousands(&frame.cycle.to_string());
+    let others = if !choice.agents.is_empty() {
+        " (the others pale)"
+    } else if scene.palette.is_by_group() {
+        ""
+    } else {
+        " (the others without color)"
+    };
     match with_trail.len() {
         0 => format!("{} {plural} before cycle {to}.", group_thousands(&all.to_string())),
         1 if all == 1 => format!("Track of one {plural}, cycles {from} to {to}."),
         n if n == all => format!("Tracks of all {n} {plural}, cycles {from} to {to}."),
-        n => format!(
-            "Tracks of {n} of {all} {plural} (the others without color), cycles {from} to {to}."
-        ),
+        n => format!("Tracks of {n} of {all} {plural}{others}, cycles {from} to {to}."),
     }
 }
 
@@ -63,7 +74,8 @@ pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     }
     // By layer, then alphabetically.
     let mut kinds = BTreeMap::new();
-    for body in scene.scenery.bodies.iter().chain(&scene.frame.bodies) {
+    let visible = scene.visible();
+    for body in &visible {
         let appearance = body.appearance(scene.scenery.dimensions);
         // Targets have a mark of their own: a patch of color would look like an area.
         if !bodies::is_target(body) && !appearance.legend.is_empty() {
@@ -76,8 +88,7 @@ pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     for ((_, words), (color, opacity)) in kinds {
         entries.push(LegendEntry::new(swatch(color, opacity), words));
     }
-    let mut shown = scene.scenery.bodies.iter().chain(&scene.frame.bodies);
-    if shown.any(bodies::is_target) {
+    if visible.iter().any(|body| bodies::is_target(body)) {
         entries.push(LegendEntry::new(LegendSymbol::Target, BodyKind::GOAL.spec().noun));
     }
     if scene.frame.bodies.iter().any(bodies::is_leader) {
@@ -86,8 +97,56 @@ pub(super) fn legend_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
     if !scene.trails.is_empty() {
         entries.push(LegendEntry::new(LegendSymbol::Ring, "beginning of a track"));
     }
-    entries.extend(named_entries(scene));
+    if scene.palette.is_by_group() {
+        entries.extend(group_entries(scene));
+    } else {
+        entries.extend(named_entries(scene));
+    }
+    entries.extend(context_entry(scene));
     entries
+}
+
+/// Returns an entry for each group of which the picture shows agents: their number, or the numbers of those that were
+/// chosen.
+fn group_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
+    let mut numbers: BTreeMap<usize, BTreeSet<u32>> = BTreeMap::new();
+    for body in scene.frame.bodies.iter().filter(|body| body.kind.is_agent()) {
+        if scene.emphasis(body.number) == AgentEmphasis::Full
+            && let Some(group) = scene.palette.group_index(body.id())
+        {
+            numbers.entry(group).or_default().insert(body.number);
+        }
+    }
+    let mut entries = Vec::new();
+    for (&index, of_group) in numbers.iter().take(MAX_NAMED) {
+        let group = &scene.palette.groups()[index];
+        let words = if scene.choice.agents.is_empty() {
+            let count = group_thousands(&of_group.len().to_string());
+            format!("{} ({count} {})", group.name, plural(group.kind, of_group.len()))
+        } else {
+            let chosen: Vec<String> = of_group.iter().map(u32::to_string).collect();
+            format!("{}: {} {}", group.name, plural(group.kind, chosen.len()), chosen.join(", "))
+        };
+        entries.push(LegendEntry::new(swatch(scene.palette.group_color(index), 1.0), words));
+    }
+    if numbers.len() > MAX_NAMED {
+        let words = format!("and {} more groups", numbers.len() - MAX_NAMED);
+        entries.push(LegendEntry::new(swatch(ANY_COLOR, 1.0), words));
+    }
+    entries
+}
+
+/// Returns an entry for the agents that are pale because others were chosen.
+fn context_entry(scene: &Scene<'_>) -> Option<LegendEntry> {
+    let all = agents(scene.scenery, scene.frame);
+    let (kind, _) = *all.first()?;
+    let others = all.iter().filter(|(_, n)| scene.emphasis(*n) == AgentEmphasis::Context).count();
+    if others == 0 {
+        return None;
+    }
+    let count = group_thousands(&others.to_string());
+    let words = format!("other {} ({count})", plural(kind, others));
+    Some(LegendEntry::new(swatch(pale(ANY_COLOR), 1.0), words))
 }
 
 /// Returns a filled square; a pale one has a rim, without which it would not be visible.
@@ -108,9 +167,7 @@ fn named_entries(scene: &Scene<'_>) -> Vec<LegendEntry> {
         .bodies
         .iter()
         .filter(|body| body.kind.role() == BodyRole::PartOfBody && body.part == Some(0))
-        .filter(|body| {
-            scene.trails.is_empty() || scene.trails.iter().any(|t| t.of.number == body.number)
-        })
+        .filter(|body| scene.emphasis(body.number) == AgentEmphasis::Full)
         .map(|body| (body.number, (body.kind, None)));
     let all: BTreeMap<u32, (BodyKind, Option<f64>)> = chains.chain(trails).collect();
     let dashes = body_dashes(&all.keys().copied().collect());

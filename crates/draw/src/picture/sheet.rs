@@ -10,8 +10,8 @@ pub(super) const EDGE_PX: f64 = 10.0;
 const TICK_PX: f64 = 4.0;
 /// The length of "y (m)" in letter sizes.
 const Y_LABEL_LETTERS: f64 = 3.0;
-/// Least width of a picture, in letters, to make room for title and legend.
-const MIN_WIDTH_LETTERS: f64 = 32.0;
+/// Least width of a picture, in letters, to make room for title and legend, and for a legend alone.
+const MIN_WIDTH_LETTERS: [f64; 2] = [32.0, 24.0];
 /// Extent from which on axes are in kilometers, meters.
 const MIN_KM_EXTENT_M: f64 = 5000.0;
 
@@ -26,6 +26,8 @@ pub(super) struct SheetContent<'a> {
     pub(super) origin_m: [f64; 2],
     /// Width and height.
     pub(super) size_m: [f64; 2],
+    /// The names of the horizontal and the vertical axis.
+    pub(super) axes: [&'static str; 2],
     pub(super) title: &'a str,
     pub(super) caption: &'a str,
 }
@@ -36,6 +38,7 @@ pub(super) struct Sheet {
     pub(super) map: Rect,
     /// Pixels per meter.
     px: f64,
+    axes: [&'static str; 2],
     unit: (&'static str, f64),
     width: f64,
     /// Length by which the label of a low map's vertical axis extends above and below it.
@@ -79,8 +82,8 @@ impl Sheet {
         let left = EDGE_PX + 1.5 * style.font_px + labels + TICK_PX + 4.0;
         let map_width = width * px;
         let map_height = height * px;
-        let width =
-            (left + map_width + 2.0 * EDGE_PX + size).max(MIN_WIDTH_LETTERS * style.font_px);
+        let min_letters = MIN_WIDTH_LETTERS[usize::from(area.title.is_empty())];
+        let width = (left + map_width + 2.0 * EDGE_PX + size).max(min_letters * style.font_px);
         let lines = text::wrap(area.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
         let top = paragraph(svg, &lines, (EDGE_PX, EDGE_PX), &title_style(style.title_px()));
         // The label of the y axis may be longer than a low map: it then needs space above and below.
@@ -92,7 +95,7 @@ impl Sheet {
             width: map_width,
             height: map_height,
         };
-        let sheet = Self { map, px, unit, width, spill };
+        let sheet = Self { map, px, axes: area.axes, unit, width, spill };
         sheet.draw_across(svg, style, &across);
         sheet.draw_upward(svg, style, &upward);
         sheet
@@ -137,7 +140,7 @@ impl Sheet {
         svg.text(
             self.map.x + self.map.width / 2.0,
             baseline + 1.45 * style.font_px,
-            &format!("x ({})", self.unit.0),
+            &format!("{} ({})", self.axes[0], self.unit.0),
             &text_style,
         );
     }
@@ -155,7 +158,7 @@ impl Sheet {
         }
         let text_style =
             TextStyle { upward: true, ..TextStyle::new(style.font_px, Anchor::Middle) };
-        let words = format!("y ({})", self.unit.0);
+        let words = format!("{} ({})", self.axes[1], self.unit.0);
         svg.text(EDGE_PX + style.font_px, self.map.y + self.map.height / 2.0, &words, &text_style);
     }
 

@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::palette::{self, MAX_SHADES};
 use crate::style::body_dashes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{
-    BODY_COLORS, Body, BodyCondition, BodyId, BodyKind, BodyRole, Color, Frame, OccupancyGrid,
-    Scenery, Shape, Trail, TrailStyle, Vec3, body_color,
+    AgentGroup, AgentNumber, BODY_COLORS, Body, BodyCondition, BodyId, BodyKind, BodyRole, Color,
+    Frame, OccupancyGrid, Scenery, Shape, Trail, TrailStyle, Vec3, body_color,
 };
 
 /// Largest number of lines in a picture: they are thin, so more of them than there are colors can be
@@ -17,6 +18,22 @@ const MAX_LINES: usize = 60;
 const RIBBON_LENGTHS_CYCLES: [Cycle; 4] = [400, 200, 100, 50];
 /// Largest fraction of the covered area that may be covered twice before ribbons are shortened.
 const MAX_OVERLAP_FRACTION: f64 = 0.3;
+
+/// The trails that a picture shows.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TrailChoice {
+    /// The agents with trails and names; the others are pale. Without any, those whose trails can be distinguished.
+    pub agents: Vec<AgentNumber>,
+    /// The first cycle of the trails; without it, they are as long as they can be distinguished.
+    pub from: Option<Cycle>,
+}
+
+impl TrailChoice {
+    /// Returns whether an agent is chosen, or a part of it.
+    pub(super) fn has(&self, number: u32) -> bool {
+        self.agents.iter().any(|agent| agent.number == number)
+    }
+}
 
 /// A trail that is drawn, as far as it is, with its style.
 #[derive(Debug, Clone)]
@@ -43,19 +60,24 @@ impl DrawnTrail<'_> {
     }
 }
 
-/// Returns agents with trails that can be distinguished in one picture: at most one of each
-/// color, or sixty if trails are thin lines; for chains the leader and the other end.
-pub fn bodies_with_trails(scenery: &Scenery, frame: &Frame) -> Vec<BodyId> {
+/// Returns the chosen agents; without a choice, those with trails that can be distinguished in one picture: at most one
+/// of each color, or a few of each group, or sixty if trails are thin lines. Of chains the leader and the other end.
+pub fn bodies_with_trails(scenery: &Scenery, frame: &Frame, choice: &TrailChoice) -> Vec<BodyId> {
     let agents = agents(scenery, frame);
     let kind = agents.first().map(|&(kind, _)| kind);
     let numbers: Vec<u32> = agents.into_iter().map(|(_, number)| number).collect();
     let Some(kind) = kind else { return Vec::new() };
+    if !choice.agents.is_empty() {
+        return chosen_bodies(frame, kind, &choice.agents);
+    }
+    let groups = palette::groups(scenery);
     let chosen = match kind.role() {
         BodyRole::PartOfBody => {
             let first = numbers.into_iter().take(BODY_COLORS.len());
             return first.flat_map(|number| ends(frame, kind, number)).collect();
         }
         BodyRole::Agent(TrailStyle::Lines) => numbers.into_iter().take(MAX_LINES).collect(),
+        _ if !groups.is_empty() => some_per_group(&numbers, groups),
         _ => one_per_color(&numbers),
     };
     chosen.into_iter().map(|number| BodyId::new(kind, number, None)).collect()
@@ -75,6 +97,19 @@ pub(super) fn agents(scenery: &Scenery, frame: &Frame) -> BTreeSet<(BodyKind, u3
         _ => None,
     });
     here.chain(starting).collect()
+}
+
+/// Returns the bodies of the agents with some numbers: of an agent of parts its ends, or the part that is meant.
+fn chosen_bodies(frame: &Frame, kind: BodyKind, agents: &[AgentNumber]) -> Vec<BodyId> {
+    let mut bodies: Vec<BodyId> = Vec::new();
+    for agent in agents {
+        let own = match (kind.role(), agent.part) {
+            (BodyRole::PartOfBody, None) => ends(frame, kind, agent.number),
+            _ => vec![BodyId::new(kind, agent.number, agent.part)],
+        };
+        bodies.extend(own.into_iter().filter(|body| !bodies.contains(body)).collect::<Vec<_>>());
+    }
+    bodies
 }
 
 /// Returns the leader of a body of parts, or its first part, and the other end.
@@ -104,20 +139,53 @@ fn one_per_color(numbers: &[u32]) -> Vec<u32> {
     chosen
 }
 
-/// Returns the trails that are drawn, and how much of them.
+/// Returns a few agents of each group, at about equal steps, the first of each before the second of any.
+fn some_per_group(numbers: &[u32], groups: &[AgentGroup]) -> Vec<u32> {
+    let of_group = |group: &AgentGroup| -> Vec<u32> {
+        numbers.iter().copied().filter(|number| group.numbers.contains(number)).collect()
+    };
+    // Further groups have the colors of these.
+    let members: Vec<Vec<u32>> = groups.iter().take(BODY_COLORS.len()).map(of_group).collect();
+    let mut counts = vec![0; members.len()];
+    for _ in 0..MAX_SHADES {
+        for (count, members) in counts.iter_mut().zip(&members) {
+            *count += usize::from(*count < members.len());
+        }
+    }
+    while counts.iter().sum::<usize>() > BODY_COLORS.len() {
+        let most = counts.iter().copied().max().unwrap_or(0);
+        // From the last one, so that the first groups keep theirs.
+        match counts.iter_mut().rev().find(|count| **count == most) {
+            Some(count) => *count -= 1,
+            None => break,
+        }
+    }
+    let mut chosen = Vec::new();
+    for (count, members) in counts.iter().zip(&members) {
+        chosen.extend((0..*count).map(|k| members[k * members.len() / count]));
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
+/// Returns the trails that are drawn, and how much of them; their colors are those of their numbers.
 pub(super) fn drawn_trails<'a>(
     scenery: &Scenery,
     frame: &Frame,
     trails: &'a [Trail],
+    choice: &TrailChoice,
 ) -> Vec<DrawnTrail<'a>> {
-    let chosen = bodies_with_trails(scenery, frame);
+    let chosen = bodies_with_trails(scenery, frame, choice);
     let sizes = sizes(scenery, frame);
     let mut shown = Vec::new();
     for trail in trails {
-        if chosen.contains(&trail.of) && !trail.points.is_empty() {
+        let from = choice.from.unwrap_or(0);
+        let first = trail.points.partition_point(|(cycle, _)| *cycle < from);
+        let points = &trail.points[first..];
+        if chosen.contains(&trail.of) && !points.is_empty() {
             shown.push(DrawnTrail {
                 of: trail.of,
-                points: &trail.points,
+                points,
                 color: body_color(trail.of.number),
                 width_m: sizes.get(&trail.of).map(|size_m| size_m[0]),
                 // Both follow from all shown trails, below.
@@ -126,7 +194,8 @@ pub(super) fn drawn_trails<'a>(
             });
         }
     }
-    if let Some(floor) = scenery.floor.as_ref().filter(|_| !sizes.is_empty()) {
+    let is_free = choice.from.is_none() && !sizes.is_empty();
+    if let Some(floor) = scenery.floor.as_ref().filter(|_| is_free) {
         shorten_ribbons(&mut shown, floor, &sizes);
     }
     let cycles = shown.iter().flat_map(|trail| trail.points).map(|(cycle, _)| *cycle);

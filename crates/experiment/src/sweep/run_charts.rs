@@ -6,7 +6,7 @@ use super::groups::RunGroups;
 use super::label::capitalized;
 use super::plan::PRIVILEGE_MARK;
 use super::table::RunColumn;
-use sidestep_document::figure::{Point, SlotStats};
+use sidestep_document::figure::{Point, RunLegend, SlotStats};
 use sidestep_document::{Figure, FigureKind, Series};
 use sidestep_kernel::ports::ColumnValues;
 use sidestep_statistics::{Sample, mean, mean_interval, percentile};
@@ -19,6 +19,8 @@ const MAX_POINTS: usize = 200;
 const MIN_BOX_RUNS: usize = 8;
 /// Least number of runs of a variant for a curve of shares.
 pub(super) const MIN_STEPS_RUNS: usize = 10;
+/// Largest least value of counts that bars show, as a fraction of the greatest: bars of others would look alike.
+const MAX_BAR_LEAST: f64 = 0.4;
 /// Reach of whiskers beyond the box, in interquartile ranges, as Tukey drew it.
 const WHISKER_RANGES: f64 = 1.5;
 
@@ -81,16 +83,17 @@ pub(super) fn joined_runs(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<
 
 fn joined(kind: FigureKind) -> FigureKind {
     match kind {
-        FigureKind::Runs { slots, has_zero_line, .. } => {
+        FigureKind::Runs { slots, has_zero_line, legend, .. } => {
             // Boxes would hide the lines.
             let slots = slots.into_iter().map(|s| SlotStats { five_numbers: None, ..s }).collect();
-            FigureKind::Runs { slots, has_zero_line, is_joined: true }
+            FigureKind::Runs { slots, has_zero_line, is_joined: true, has_bars: false, legend }
         }
         other => other,
     }
 }
 
-/// Returns the runs of all variants as swarms over boxes; `None` where variants are too many.
+/// Returns the runs of all variants as swarms over boxes, or of counts over bars that start at zero; `None` where variants
+/// are too many.
 pub(super) fn boxed_runs(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<Figure> {
     if !is_number(metric) || !has_slots(groups) {
         return None;
@@ -98,6 +101,13 @@ pub(super) fn boxed_runs(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<F
     let columns: Vec<_> = (0..groups.variants.len()).map(|v| groups.values(metric, v)).collect();
     let most = columns.iter().map(Vec::len).max().unwrap_or(0);
     let label = groups.label(metric);
+    if most <= MAX_POINTS && are_counts_from_zero(metric, &columns) {
+        let figure = runs_figure(groups, columns, false);
+        let note = "Bars: means. Each point is a run.".into();
+        let kind = with_bars(figure.kind);
+        let title = capitalized(&label);
+        return Some(Figure { title, note, y_label: label.to_string(), kind, ..figure });
+    }
     let boxes = if most >= MIN_BOX_RUNS {
         " Boxes: quartiles and median; whiskers: the values within 1.5 interquartile ranges."
     } else {
@@ -107,6 +117,25 @@ pub(super) fn boxed_runs(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<F
     let note = format!("{points}{boxes}").trim().to_string();
     let figure = runs_figure(groups, columns, false);
     Some(Figure { title: capitalized(&label), note, y_label: label.to_string(), ..figure })
+}
+
+/// Returns whether values are counts of which some are near zero.
+fn are_counts_from_zero(metric: &RunColumn, columns: &[Vec<Option<f64>>]) -> bool {
+    let are_counts = matches!(metric.values, ColumnValues::U32(_) | ColumnValues::U64(_));
+    let values = || columns.iter().flatten().flatten().copied();
+    let least = values().fold(f64::INFINITY, f64::min);
+    let greatest = values().fold(0.0, f64::max);
+    are_counts && greatest > 0.0 && least <= MAX_BAR_LEAST * greatest
+}
+
+fn with_bars(kind: FigureKind) -> FigureKind {
+    match kind {
+        FigureKind::Runs { slots, has_zero_line, is_joined, legend, .. } => {
+            let slots = slots.into_iter().map(|s| SlotStats { five_numbers: None, ..s }).collect();
+            FigureKind::Runs { slots, is_joined, has_zero_line, has_bars: true, legend }
+        }
+        other => other,
+    }
 }
 
 /// Returns the differences of variants from their baseline, seed by seed; `None` without any.
@@ -143,7 +172,13 @@ pub(super) fn differences(
         note: "Each point is the difference on one seed.".into(),
         x_label: names.label,
         y_label: format!("difference: {label}"),
-        kind: FigureKind::Runs { slots, is_joined: false, has_zero_line: true },
+        kind: FigureKind::Runs {
+            slots,
+            is_joined: false,
+            has_zero_line: true,
+            has_bars: false,
+            legend: RunLegend::default(),
+        },
         series,
         ..Figure::default()
     })
@@ -209,7 +244,13 @@ fn runs_figure(
     }
     Figure {
         x_label: names.label,
-        kind: FigureKind::Runs { slots, is_joined: false, has_zero_line },
+        kind: FigureKind::Runs {
+            slots,
+            is_joined: false,
+            has_zero_line,
+            has_bars: false,
+            legend: RunLegend::default(),
+        },
         series,
         ..Figure::default()
     }

@@ -9,6 +9,7 @@ mod body;
 mod color;
 mod earth;
 mod grid_team;
+mod group;
 mod inspect;
 mod kind;
 mod log;
@@ -23,6 +24,7 @@ pub use color::{
 };
 pub use earth::{EarthChart, EarthProjection, EarthReference};
 pub use grid_team::{GridAgent, GridPlace, GridTask, GridTeam};
+pub use group::{AgentGroup, AgentNumber};
 pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, MarkRole, MarkShape};
 pub use kind::{BodyKind, BodyRole, KindSpec, Kinds, LegendTexts, Outline, Paint, TrailStyle};
 pub use log::{EventBuffer, LogEvent, LogEventKind, Quantity, Severity};
@@ -47,6 +49,9 @@ pub struct Scenery {
     pub bodies: Vec<Body>,
     /// Names of bodies that have their own, by kind and number.
     pub names: Vec<(BodyKind, u32, String)>,
+    /// Agents that the scenario describes together, by rising number; none in worlds without groups.
+    #[serde(default)]
+    pub groups: Vec<AgentGroup>,
     /// Where on earth, and when, all this is.
     pub earth: EarthReference,
 }

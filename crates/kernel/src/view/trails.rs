@@ -262,6 +262,7 @@ mod tests {
             floor: None,
             bodies: Vec::new(),
             names: Vec::new(),
+            groups: Vec::new(),
             earth: Default::default(),
         };
         rows().trails(&scenery, &frame, &[BodyId::new(ROBOT, 7, None)], column)

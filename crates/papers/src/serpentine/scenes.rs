@@ -116,6 +116,7 @@ fn scene_of_chain(title: &str, points: Vec<Point<2>>) -> Scene {
             floor: None,
             bodies: Vec::new(),
             names: vec![(CONNECTOR, 0, "chain".into())],
+            groups: Vec::new(),
             earth: Default::default(),
         },
         frame: Frame { bodies: chain(points), ..Frame::default() },

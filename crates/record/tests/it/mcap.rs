@@ -46,6 +46,7 @@ fn scenery() -> Scenery {
         cycle_s: 0.1,
         floor: Some(floor),
         names: Vec::new(),
+        groups: Vec::new(),
         earth: Default::default(),
         bodies: vec![Body::new(BodyKind::OBSTACLE, 0, Pose::from_position([0.0; 3]), wall)],
     }

@@ -14,6 +14,7 @@ fn scenery(dimensions: u8) -> Scenery {
         floor: None,
         bodies: Vec::new(),
         names: vec![(ROBOT, 1, "Anna".into())],
+        groups: Vec::new(),
         earth: Default::default(),
     }
 }

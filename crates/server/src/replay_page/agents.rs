@@ -1,68 +1,8 @@
 //! Which agents are inspected for a replay, and in which cycles.
 
-use sidestep_kernel::view::{Body, Frame};
+use sidestep_kernel::view::{AgentNumber, Body, Frame};
 use sidestep_kernel::{Cycle, InputError};
-use std::fmt;
-use std::str::FromStr;
-
-/// An agent by its number, and by that of a part where only one is meant: `8`, `8/17`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct AgentNumber {
-    number: u32,
-    part: Option<u32>,
-}
-
-impl AgentNumber {
-    fn matches(self, body: &Body) -> bool {
-        body.number == self.number && (self.part.is_none() || body.part == self.part)
-    }
-}
-
-impl FromStr for AgentNumber {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (number, part) = match text.split_once('/') {
-            Some((number, part)) => (number.parse(), Some(part.parse())),
-            None => (text.parse(), None),
-        };
-        let wrong = || format!("`{text}` is no number of an agent, like 8, or 8/17 with a part");
-        let number = number.map_err(|_| wrong())?;
-        let part = part.transpose().map_err(|_| wrong())?;
-        Ok(Self { number, part })
-    }
-}
-
-impl fmt::Display for AgentNumber {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.part {
-            Some(part) => write!(out, "{}/{part}", self.number),
-            None => write!(out, "{}", self.number),
-        }
-    }
-}
-
-/// Cycles from one to another, both included: `200:400`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CycleWindow {
-    from: Cycle,
-    until: Cycle,
-}
-
-impl FromStr for CycleWindow {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no window of cycles, like 200:400");
-        let (from, until) = text.split_once(':').ok_or_else(wrong)?;
-        let from = from.parse().map_err(|_| wrong())?;
-        let until = until.parse().map_err(|_| wrong())?;
-        if until < from {
-            return Err(format!("the window ends at {until}, before it begins at {from}"));
-        }
-        Ok(Self { from, until })
-    }
-}
+use sidestep_session::export::CycleWindow;
 
 /// The inspections that a replay holds: of some agents or of all, in all cycles or in some; of none without either.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -76,8 +16,7 @@ pub struct InspectionRequest {
 impl InspectionRequest {
     /// Returns the agents of a frame that are inspected in its cycle.
     pub(super) fn agents_of<'a>(&self, frame: &'a Frame) -> Vec<&'a Body> {
-        let is_in_window =
-            |window: CycleWindow| (window.from..=window.until).contains(&frame.cycle);
+        let is_in_window = |window: CycleWindow| window.contains(frame.cycle);
         let is_due = self.cycles.map_or(!self.agents.is_empty(), is_in_window);
         if !is_due {
             return Vec::new();
@@ -87,7 +26,7 @@ impl InspectionRequest {
     }
 
     fn includes(&self, body: &Body) -> bool {
-        self.agents.is_empty() || self.agents.iter().any(|agent| agent.matches(body))
+        self.agents.is_empty() || self.agents.iter().any(|agent| agent.matches(body.id()))
     }
 
     /// Refuses agents and cycles that the part of the run does not have; `first` is its first frame.
@@ -102,29 +41,11 @@ impl InspectionRequest {
         if let Some(window) = self.cycles
             && (window.from > until || window.until < from)
         {
-            let place = format!("--cycles {}:{}", window.from, window.until);
+            let place = format!("--cycles {window}");
             let cause = format!("the file has cycles {from} to {until}");
             return Err(InputError::new(place, cause, format!("give {from}:{until} or less")));
         }
-        let agents: Vec<&Body> = first.bodies.iter().filter(|body| body.kind.is_agent()).collect();
-        for agent in &self.agents {
-            // Airplanes may come later: only a number that is beyond all is certainly wrong, or a part of one that is
-            // there without it.
-            if agents.iter().any(|body| agent.matches(body)) {
-                continue;
-            }
-            let highest = agents.iter().map(|body| body.number).max().unwrap_or(0);
-            let cause = if agent.number > highest {
-                format!("there is no such agent: their numbers are 0 to {highest}")
-            } else if agents.iter().any(|body| body.number == agent.number) {
-                "there is such an agent, but it has no such part".to_string()
-            } else {
-                continue;
-            };
-            let remedy = "give numbers as the list of agents of the studio has them";
-            return Err(InputError::new(format!("--agents {agent}"), cause, remedy));
-        }
-        Ok(())
+        AgentNumber::check_all(&self.agents, &first.bodies)
     }
 
     /// Returns what can be inspected, in words; `noun` is that for an agent.
@@ -189,7 +110,5 @@ mod tests {
         assert!(told(request(&["3/5"], None)).contains("has no such part"));
         assert!(told(request(&[], Some("101:200"))).contains("cycles 0 to 100"));
         assert!(check(request(&["3"], Some("100:200"))).is_ok());
-        assert!("1:x".parse::<CycleWindow>().is_err() && "9:2".parse::<CycleWindow>().is_err());
-        assert!("-1".parse::<AgentNumber>().is_err() && "1/".parse::<AgentNumber>().is_err());
     }
 }

@@ -80,6 +80,7 @@ mod tests {
             floor: None,
             bodies: Vec::new(),
             names: Vec::new(),
+            groups: Vec::new(),
             earth: EarthReference::default(),
         };
         finest_step_exponent(&scenery, &frame)

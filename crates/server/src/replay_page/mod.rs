@@ -18,7 +18,7 @@ mod plane;
 #[cfg(test)]
 mod tests;
 
-pub use agents::{AgentNumber, CycleWindow, InspectionRequest};
+pub use agents::InspectionRequest;
 
 use crate::metric_history::{MetricHistory, MetricWords};
 use crate::page;

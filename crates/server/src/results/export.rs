@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Response};
 use sidestep_kernel::{Cycle, Interrupt};
 use sidestep_scenario::Worlds;
 use sidestep_session::export::{AnimationOptions, ExportRequest, ExportScope, Format, export};
-use sidestep_session::{Error, RecordedRun, Watcher};
+use sidestep_session::{Error, PictureLook, RecordedRun, Watcher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -135,7 +135,8 @@ fn write_export(
         every: None,
         workers,
     };
-    let request = ExportRequest { form: spec.format.clone(), scope };
+    let look = PictureLook::default();
+    let request = ExportRequest { form: spec.format.clone(), look, scope };
     let watcher = SizeLimitWatcher { cancel, folder: folder.path() };
     let exported = export(&recorded, &request, &watcher);
     // An export that was stopped because of its size ends like one that was cancelled.

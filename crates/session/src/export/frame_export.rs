@@ -3,7 +3,7 @@
 use super::target::Target;
 use super::{CycleRange, ExportContext, ExportResult, ExportScope};
 use crate::driver::Sinks;
-use crate::{Error, FrameSink, RecordedRun, Watcher};
+use crate::{Error, FrameSink, PictureLook, RecordedRun, Watcher};
 use sidestep_kernel::{Cycle, Simulation};
 use std::io::Write;
 
@@ -24,7 +24,15 @@ impl<'a> FrameSource<'a> {
     ) -> Result<Self, Error> {
         recorded.check_has_content()?;
         let span = CycleRange::from_request(scope, recorded)?;
-        Ok(Self { job: ExportContext { recorded, wanted: scope, span, watcher } })
+        Ok(Self {
+            job: ExportContext {
+                recorded,
+                wanted: scope,
+                look: PictureLook::default(),
+                span,
+                watcher,
+            },
+        })
     }
 
     /// Returns the run that was recorded.

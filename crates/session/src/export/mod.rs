@@ -1,6 +1,7 @@
 //! Exports of recorded runs to other formats. Tables are copied from the run folder; everything
 //! else is computed again from the recorded scenario.
 
+mod cycle_window;
 mod frame_export;
 mod geojson;
 mod league;
@@ -9,10 +10,12 @@ mod tables;
 mod target;
 mod trajectory;
 
+pub use cycle_window::CycleWindow;
 pub use frame_export::{ExportFile, FrameSource};
 
 use crate::driver::{Sinks, drive};
 use crate::frame_sink::{BagSink, EndReason, McapSink};
+use crate::picture::PictureLook;
 use crate::{Error, RecordedRun, Watcher};
 use sidestep_kernel::{Cycle, InputError, Simulation};
 use std::path::{Path, PathBuf};
@@ -62,6 +65,8 @@ pub struct AnimationOptions {
 pub struct ExportRequest<'a> {
     /// The format, with its own options.
     pub form: Format,
+    /// The look of a picture or an animation.
+    pub look: PictureLook,
     /// The part of the run, and the place.
     pub scope: ExportScope<'a>,
 }
@@ -116,6 +121,7 @@ pub fn export(
     let job = ExportContext {
         recorded,
         wanted: &wanted.scope,
+        look: wanted.look.clone(),
         span: CycleRange::from_request(&wanted.scope, recorded)?,
         watcher,
     };
@@ -140,6 +146,7 @@ pub fn export(
 struct ExportContext<'a> {
     recorded: &'a RecordedRun,
     wanted: &'a ExportScope<'a>,
+    look: PictureLook,
     span: CycleRange,
     watcher: &'a dyn Watcher,
 }

@@ -7,8 +7,9 @@ use crate::frame_sink::{AnimationFrames, write_gif};
 use crate::picture::{draw_svg, footnote};
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
-use sidestep_draw::{AnimationFrame, AnimationRenderer, to_png};
+use sidestep_draw::{AnimationFrame, AnimationRenderer, AnimationSize, to_png};
 use sidestep_kernel::Cycle;
+use sidestep_kernel::view::FrameOptions;
 use std::io::Write;
 use std::path::Path;
 
@@ -31,9 +32,12 @@ pub(super) fn export_png(
     job: &ExportContext<'_>,
     width_px: Option<u16>,
 ) -> Result<ExportResult, Error> {
-    export_picture(job, ".png", |svg| {
-        Ok(to_png(&svg, width_px.unwrap_or(DEFAULT_PNG_WIDTH_PX).into())?)
-    })
+    let default_px = match job.look.size_px {
+        Some([width, height]) => width.max(height),
+        None => DEFAULT_PNG_WIDTH_PX.into(),
+    };
+    let longer_px = width_px.map_or(default_px, u32::from);
+    export_picture(job, ".png", |svg| Ok(to_png(&svg, longer_px)?))
 }
 
 fn export_picture(
@@ -45,7 +49,7 @@ fn export_picture(
     let mut run = job.run_up_to(job.wanted.from.unwrap_or(job.span.until))?;
     let is_confirmed = job.recorded.verify_digest(run.as_ref())?;
     let origin = format!("Cycle {}. {}", run.cycle(), footnote(run.as_ref()));
-    let svg = draw_svg(run.as_mut(), job.recorded.folder.as_deref(), &origin)?;
+    let svg = draw_svg(run.as_mut(), job.recorded.folder.as_deref(), &origin, &job.look)?;
     let bytes = encode(svg)?;
     target.write_stream(|file| file.write_all(&bytes))?;
     Ok(ExportResult::single_file(target.path(), is_confirmed))
@@ -54,8 +58,7 @@ fn export_picture(
 pub(super) fn export_gif(job: &ExportContext<'_>, options: Options) -> Result<ExportResult, Error> {
     let target = Target::for_file(job, ".gif")?;
     export_animation(job, options, &target, |animation| {
-        let width_px = options.width_px.unwrap_or(DEFAULT_GIF_WIDTH_PX);
-        animation.write_gif(width_px, &target)
+        animation.write_gif(job.animation_size(options.width_px, DEFAULT_GIF_WIDTH_PX), &target)
     })
 }
 
@@ -65,9 +68,19 @@ pub(super) fn export_frames(
 ) -> Result<ExportResult, Error> {
     let target = Target::for_folder(job, "-frames")?;
     export_animation(job, options, &target, |animation| {
-        let width_px = options.width_px.unwrap_or(DEFAULT_FRAME_WIDTH_PX);
-        target.write_folder(job.watcher, |folder| animation.write_frames(width_px, folder))
+        let size = job.animation_size(options.width_px, DEFAULT_FRAME_WIDTH_PX);
+        target.write_folder(job.watcher, |folder| animation.write_frames(size, folder))
     })
+}
+
+impl ExportContext<'_> {
+    /// Returns the size of an animation: a given one, or a longer side.
+    fn animation_size(&self, longer_px: Option<u16>, default_px: u16) -> AnimationSize {
+        match self.look.size_px {
+            Some(size_px) => AnimationSize::Exact(size_px),
+            None => AnimationSize::LongerSide(longer_px.unwrap_or(default_px).into()),
+        }
+    }
 }
 
 fn export_animation(
@@ -82,7 +95,8 @@ fn export_animation(
     // One frame is of the start, before the first interval.
     let default_every = cycles.div_ceil(MAX_FRAMES - 1).max(1);
     let every = job.wanted.every.unwrap_or(default_every);
-    let mut pictures = AnimationFrames::new(run.as_ref(), every, cycles);
+    job.look.check(&run.scenery(), &run.frame(FrameOptions::WITHOUT_SCANS))?;
+    let mut pictures = AnimationFrames::new(run.as_ref(), every, cycles, &job.look);
     let sinks = Sinks { frames: Some(&mut pictures), ..Sinks::default() };
     job.drive(run.as_mut(), span.until, sinks)?;
     let is_confirmed = job.recorded.verify_digest(run.as_ref())?;
@@ -106,8 +120,8 @@ struct Animation<'a> {
 }
 
 impl Animation<'_> {
-    fn write_gif(&self, width_px: u16, to: &Target) -> Result<(), Error> {
-        let view = self.pictures.view(width_px.into())?;
+    fn write_gif(&self, size: AnimationSize, to: &Target) -> Result<(), Error> {
+        let view = self.pictures.view(size)?;
         let watched = ProgressGuard(self.watcher);
         let pixels = (0..self.pictures.len()).map(|index| {
             let picture = self.draw(&view, index, &watched).map_err(std::io::Error::other)?;
@@ -116,8 +130,8 @@ impl Animation<'_> {
         to.write_stream(|file| write_gif(file, view.size_px(), f64::from(self.fps), pixels))
     }
 
-    fn write_frames(&self, width_px: u16, folder: &Path) -> Result<(), Error> {
-        let view = self.pictures.view(width_px.into())?;
+    fn write_frames(&self, size: AnimationSize, folder: &Path) -> Result<(), Error> {
+        let view = self.pictures.view(size)?;
         let watched = ProgressGuard(self.watcher);
         for index in 0..self.pictures.len() {
             let png = self.draw(&view, index, &watched)?.to_png()?;

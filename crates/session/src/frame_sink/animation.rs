@@ -3,7 +3,11 @@
 
 use super::FrameSink;
 use crate::Error;
-use sidestep_draw::{AnimationFrame, AnimationRenderer as View, bodies_with_trails};
+use crate::picture::PictureLook;
+use sidestep_draw::{
+    AnimationFrame, AnimationLook, AnimationRenderer as View, AnimationSize, PictureView,
+    TrailChoice, bodies_with_trails,
+};
 use sidestep_kernel::Simulation;
 use sidestep_kernel::text::group_thousands;
 use sidestep_kernel::view::{
@@ -22,6 +26,8 @@ const TRAIL_FRAMES: usize = 30;
 /// Frames and tracks of a run, kept until all are complete and the common view is known.
 pub(crate) struct AnimationFrames {
     scenery: Scenery,
+    choice: TrailChoice,
+    view: PictureView,
     every: Cycle,
     frames: Vec<Frame>,
     bodies: usize,
@@ -39,9 +45,17 @@ struct Track {
 
 impl AnimationFrames {
     /// Returns an animation of a run with a frame every `every` cycles, `cycles` long.
-    pub(crate) fn new(run: &dyn Simulation, every: Cycle, cycles: Cycle) -> Self {
+    pub(crate) fn new(
+        run: &dyn Simulation,
+        every: Cycle,
+        cycles: Cycle,
+        look: &PictureLook,
+    ) -> Self {
         Self {
             scenery: run.scenery(),
+            // Trails are those of the last frames, whatever the first cycle of all.
+            choice: TrailChoice { from: None, ..look.trail_choice() },
+            view: look.view,
             every,
             frames: Vec::new(),
             bodies: 0,
@@ -54,7 +68,7 @@ impl AnimationFrames {
     /// Adds the places of the bodies with tracks to show.
     fn add_positions(&mut self, frame: &Frame) {
         let whose: BTreeSet<BodyId> =
-            bodies_with_trails(&self.scenery, frame).into_iter().collect();
+            bodies_with_trails(&self.scenery, frame, &self.choice).into_iter().collect();
         for body in frame.bodies.iter().filter(|body| whose.contains(&body.id())) {
             let track = self.tracks.entry(body.id()).or_default();
             if let Some(&(cycle, at_m)) = track.places.last() {
@@ -92,16 +106,18 @@ impl AnimationFrames {
     ///
     /// # Errors
     /// When it cannot be drawn.
-    pub(crate) fn view(&self, width_px: u32) -> Result<View, Error> {
-        Ok(View::new(self.scenery.clone(), &self.frames, width_px)?)
+    pub(crate) fn view(&self, size: AnimationSize) -> Result<View, Error> {
+        let look = AnimationLook { size, trails: self.choice.clone(), view: self.view };
+        Ok(View::new(self.scenery.clone(), &self.frames, &look)?)
     }
 
+    /// Draws a frame.
     ///
     /// # Errors
     /// When it cannot be drawn.
     pub(crate) fn draw(&self, view: &View, index: usize) -> Result<AnimationFrame, Error> {
         let frame = &self.frames[index];
-        let whose = bodies_with_trails(&self.scenery, frame);
+        let whose = bodies_with_trails(&self.scenery, frame, &self.choice);
         let trails: Vec<Trail> = whose.into_iter().map(|of| self.trail(of, index)).collect();
         Ok(view.render(frame, &trails, &self.caption(frame))?)
     }
@@ -198,13 +214,13 @@ mod tests {
         let compiled = WORLDS.compile(&source).expect("a scenario");
         let mut run = compiled.start(&source, 1);
         let mut alone = compiled.start(&source, 1);
-        let mut pictures = AnimationFrames::new(run.as_ref(), 67, 200);
+        let mut pictures = AnimationFrames::new(run.as_ref(), 67, 200, &PictureLook::default());
         let sinks = Sinks { frames: Some(&mut pictures), ..Sinks::default() };
         drive(run.as_mut(), 200, sinks, &NoWatcher).expect("a film");
         alone.advance(200);
         assert_eq!(run.digest(), alone.digest(), "looking changes nothing");
         let last = pictures.len() - 1;
-        for of in bodies_with_trails(&pictures.scenery, &pictures.frames[last]) {
+        for of in bodies_with_trails(&pictures.scenery, &pictures.frames[last], &pictures.choice) {
             let way = pictures.trail(of, last).points;
             let mut cycles: Vec<Cycle> = way.iter().map(|(cycle, _)| *cycle).collect();
             cycles.dedup();

@@ -5,6 +5,7 @@
 //! sweep.rs      the folder of a sweep -> a document
 //! tables.rs     its tables and columns           events.rs    timeline of events
 //! text.rs       numbers as text                   series.rs    metrics over time
+//! tracks.rs     the tracks of a run as a figure for print
 //! ```
 
 mod events;
@@ -15,6 +16,7 @@ mod sweep;
 mod sweep_series;
 mod tables;
 mod text;
+mod tracks;
 
 use crate::sweep::Folder;
 use crate::{Error, Watcher};
@@ -23,6 +25,7 @@ use sidestep_scenario::Worlds;
 use std::path::Path;
 
 pub use text::format_duration;
+pub use tracks::{TrackFigure, track_figure};
 
 /// Returns the report of a run folder or of the folder of a sweep. Only this function distinguishes
 /// the two.

@@ -2,7 +2,7 @@
 
 use crate::support::{StopAt, TestFolder, WORLDS, names};
 use sidestep_session::export::{AnimationOptions, ExportRequest, ExportScope, Format, export};
-use sidestep_session::{Error, NoWatcher, OutputPaths, RecordedRun, replay_all};
+use sidestep_session::{Error, NoWatcher, OutputPaths, PictureLook, RecordedRun, replay_all};
 use std::path::{Path, PathBuf};
 
 pub(crate) fn wanted(form: Format, out: &Path) -> ExportRequest<'_> {
@@ -14,7 +14,7 @@ pub(crate) fn wanted(form: Format, out: &Path) -> ExportRequest<'_> {
         every: None,
         workers: 1,
     };
-    ExportRequest { form, scope }
+    ExportRequest { form, look: PictureLook::default(), scope }
 }
 
 #[test]

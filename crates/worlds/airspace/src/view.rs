@@ -49,6 +49,7 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
         floor: None,
         bodies,
         names: body_names(world),
+        groups: Vec::new(),
         earth: EarthReference {
             chart: world.chart().earth_chart(),
             start_utc_s: world.start_utc_s,

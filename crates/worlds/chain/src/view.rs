@@ -44,6 +44,7 @@ impl<const D: usize> ChainWorld<D> {
                 .filter(|(_, spec)| !spec.name.is_empty())
                 .map(|(id, spec)| (kinds::CONNECTOR, id, spec.name.clone()))
                 .collect(),
+            groups: Vec::new(),
             earth: Default::default(),
         }
     }

@@ -29,7 +29,7 @@ pub const PERSON: BodyKind = BodyKind::new(&KindSpec {
     layer: 4,
     paint: Paint::Fixed { color: MOBILE_COLOR, open_opacity: 1.0 },
     outline: Outline::Shade,
-    legend: LegendTexts::new("mobile object"),
+    legend: LegendTexts::new("person"),
     shows_heading: false,
 });
 

@@ -34,6 +34,7 @@ impl RobotsWorld {
             floor: Some(self.map.occupancy_grid()),
             bodies: Vec::new(),
             names: Vec::new(),
+            groups: self.agent_groups.clone(),
             earth: Default::default(),
         }
     }

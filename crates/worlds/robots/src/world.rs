@@ -17,6 +17,7 @@ use sidestep_kernel::control::AgentTeams;
 use sidestep_kernel::distr::{Bernoulli, DistributionError};
 use sidestep_kernel::space::GridPosition;
 use sidestep_kernel::stream::{Purpose, Streams};
+use sidestep_kernel::view::AgentGroup;
 use sidestep_kernel::{EntityId, Seed};
 use sidestep_map::{GridMap, Rect};
 use std::ops::Range;
@@ -114,6 +115,8 @@ pub struct RobotsWorld {
     /// The robots as a caller sees them.
     pub(super) teams: Arc<AgentTeams>,
     pub(super) robots: Vec<EntityId>,
+    /// The robots by the sections of the scenario.
+    pub(super) agent_groups: Vec<AgentGroup>,
     /// The teams of robots that a planner leads.
     pub(super) planner_teams: Vec<Team>,
     /// The robots whose behavior has goals, by rising id.

@@ -8,7 +8,7 @@ use crate::progress::StageBar;
 use clap::Args;
 use sidestep::kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_document::document::Picture;
-use sidestep_draw::{DrawError, describe};
+use sidestep_draw::{DrawError, TrailChoice, describe};
 use sidestep_papers::Scene;
 use sidestep_papers::loria::scenes;
 use sidestep_papers::loria::{
@@ -79,7 +79,8 @@ pub(super) fn reproduce(args: &LoriaArgs, console: Console) -> Result<ExitCode, 
 
 /// Returns a picture with a caption that starts with a description of the scene.
 fn described_picture(scene: &Scene) -> Result<Picture, DrawError> {
-    let description = describe(&scene.scenery, &scene.frame, &scene.trails);
+    let description =
+        describe(&scene.scenery, &scene.frame, &scene.trails, &TrailChoice::default());
     let picture = scene_picture(scene)?;
     Ok(Picture { caption: format!("{description} {}", picture.caption), ..picture })
 }

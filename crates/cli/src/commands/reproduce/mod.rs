@@ -16,7 +16,7 @@ use sidestep::kernel::InputError;
 use sidestep_document::Document;
 use sidestep_document::claim::{Claim, verdict_summary};
 use sidestep_document::document::Picture;
-use sidestep_draw::{DrawError, PictureOptions, Style, draw};
+use sidestep_draw::{DrawError, PictureOptions, draw};
 use sidestep_papers::{Scene, TrialFile, TrialFileError, TrialFileHead};
 use std::path::Path;
 
@@ -61,8 +61,8 @@ pub(crate) fn reproduce(args: &ReproduceArgs, console: Console) -> Result<ExitCo
 
 /// Returns a picture with its title and caption beside it.
 fn scene_picture(scene: &Scene) -> Result<Picture, DrawError> {
-    let options =
-        PictureOptions { style: Style::MAP, title: String::new(), caption: String::new() };
+    let page = PictureOptions::page(&scene.scenery, "");
+    let options = PictureOptions { title: String::new(), ..page };
     let svg = draw(&scene.scenery, &scene.frame, &scene.trails, &options)?;
     Ok(Picture { title: scene.title.clone(), caption: scene.caption.clone(), svg })
 }

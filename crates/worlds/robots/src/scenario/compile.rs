@@ -1,5 +1,6 @@
 //! Compilation of a scenario's text to an immutable world and the start of every body.
 
+mod agent_groups;
 mod bodies;
 mod effectless;
 mod known_tables;
@@ -12,6 +13,7 @@ mod robots;
 mod tasks;
 pub(super) mod unused_keys;
 
+use self::agent_groups::agent_groups;
 use self::effectless::{Given, effectless_remarks};
 use self::known_tables::{KnownTables, known_tables};
 use self::map::{LoadedMap, load_map, padded};
@@ -226,6 +228,7 @@ impl<'a> Compiler<'a> {
         let has_requests = self.has_requests();
         let has_delays = self.has_delays();
         let delay_teams = self.delay_teams(&placer);
+        let agent_groups = agent_groups(&placer, &self.types, &self.kinds.names());
         let has_long_actions = placer.groups.iter().any(|group| group.action_cycles > 1);
         let kind_rank = self.kind_rank()?;
         let planner_teams = placer.planner_teams();
@@ -244,6 +247,7 @@ impl<'a> Compiler<'a> {
             radio,
             teams: Arc::default(),
             robots,
+            agent_groups,
             watched_robots: watched,
             planner_teams,
             goal_robots,

@@ -8,6 +8,8 @@ use sidestep_planners::TeamTasks;
 /// Bodies that a scenario describes together.
 #[derive(Debug)]
 pub(super) struct BodyGroup {
+    /// The name that the scenario gives them; may be empty.
+    pub(super) name: String,
     pub(super) count: u64,
     /// Given places; drawn inside `region` where empty.
     pub(super) places: Vec<Spanned<StartPose>>,

@@ -28,6 +28,7 @@ impl Compiler<'_> {
         let ty = self.body_type(&s.kind, size, actions, Role::Mover(Mover { straight }))?;
         let ty = GroupTypes::Shared(self.add_type(ty, &span)?);
         Ok(BodyGroup {
+            name: String::new(),
             count,
             places: s.at.clone(),
             region: self.region(s.region.as_ref())?,
@@ -58,6 +59,7 @@ impl Compiler<'_> {
             places.push(place.clone());
         }
         Ok(BodyGroup {
+            name: String::new(),
             count: doors.len() as u64,
             places,
             region: None,

@@ -35,6 +35,7 @@ impl Compiler<'_> {
         let ty = self.body_type(&s.kind, (size, size), actions, role)?;
         let ty = GroupTypes::Shared(self.add_type(ty, &span)?);
         let group = BodyGroup {
+            name: s.name.clone(),
             count,
             places: s.at.clone(),
             region: self.region(s.region.as_ref())?,
@@ -85,6 +86,7 @@ impl Compiler<'_> {
             places.push(Spanned::new(scen.span(), StartPose { at: row.start, facing: None }));
         }
         let group = BodyGroup {
+            name: s.name.clone(),
             count: count as u64,
             places,
             region: None,

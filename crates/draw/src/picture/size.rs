@@ -1,0 +1,62 @@
+//! Pictures of exactly some size, with all their words.
+
+use super::PictureOptions;
+use crate::error::DrawError;
+use crate::style::Style;
+use crate::svg::{on_page, page_size};
+
+/// How much larger than the picture its layout may be, one after the other: the words of small pictures are small.
+const ENLARGEMENTS: [f64; 5] = [1.0, 1.3, 1.7, 2.2, 3.0];
+/// Most layouts that are tried for one size: the room that words take is known after the first, but for line breaks.
+const MAX_LAYOUTS: usize = 5;
+
+/// Draws a picture of exactly some size: as large as it can be in there, in the middle. It is laid out in that size, but
+/// no larger than the style's, with which its words would be tiny beside it.
+///
+/// # Errors
+/// When its words leave no room for it, or it cannot be drawn at all.
+pub(super) fn fit(
+    [width_px, height_px]: [u32; 2],
+    options: &PictureOptions,
+    draw: impl Fn(&PictureOptions) -> Result<String, DrawError>,
+) -> Result<String, DrawError> {
+    let size_px = [f64::from(width_px), f64::from(height_px)];
+    let longer_px = size_px[0].max(size_px[1]);
+    let layout_px = options.style.width_px.max(options.style.height_px);
+    let least = (layout_px / longer_px).min(1.0);
+    for enlargement in ENLARGEMENTS {
+        let layout_px = size_px.map(|side_px| side_px * least * enlargement);
+        if let Some(svg) = fit_layout(layout_px, options, &draw)? {
+            return Ok(on_page(&svg, layout_px, size_px));
+        }
+    }
+    let value = longer_px;
+    Err(DrawError::Value {
+        what: "longer side of a picture in px",
+        value,
+        must: "larger for its words",
+    })
+}
+
+/// Draws a picture that is no larger than some layout; `None` if its words leave no room for it.
+fn fit_layout(
+    layout_px: [f64; 2],
+    options: &PictureOptions,
+    draw: &impl Fn(&PictureOptions) -> Result<String, DrawError>,
+) -> Result<Option<String>, DrawError> {
+    let mut room_px = layout_px;
+    for _ in 0..MAX_LAYOUTS {
+        let style = Style { width_px: room_px[0], height_px: room_px[1], ..options.style };
+        if style.check().is_err() {
+            return Ok(None);
+        }
+        let svg = draw(&PictureOptions { style, ..options.clone() })?;
+        let Some(taken_px) = page_size(&svg) else { return Ok(None) };
+        let excess_px = [0, 1].map(|k| (taken_px[k] - layout_px[k]).max(0.0));
+        if excess_px == [0.0; 2] {
+            return Ok(Some(svg));
+        }
+        room_px = [0, 1].map(|k| room_px[k] - excess_px[k]);
+    }
+    Ok(None)
+}
