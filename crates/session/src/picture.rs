@@ -86,14 +86,28 @@ pub(crate) fn draw_svg(
         Some(folder) => read_trails(&run.position_columns(), folder, &scenery, &frame, &choice)?,
         None => Vec::new(),
     };
-    let caption = format!("{} {origin}", describe(&scenery, &frame, &trails, &choice));
+    draw_moment(&scenery, &frame, &trails, (origin, look))
+}
+
+/// Returns a moment with the tracks that led to it as SVG.
+///
+/// # Errors
+/// When it cannot be drawn.
+pub(crate) fn draw_moment(
+    scenery: &Scenery,
+    frame: &Frame,
+    trails: &[Trail],
+    (origin, look): (&str, &PictureLook),
+) -> Result<String, Error> {
+    let choice = look.trail_choice();
+    let caption = format!("{} {origin}", describe(scenery, frame, trails, &choice));
     let options = PictureOptions {
         trails: choice,
         view: look.view,
         size_px: look.size_px,
-        ..PictureOptions::page(&scenery, caption)
+        ..PictureOptions::page(scenery, caption)
     };
-    Ok(draw(&scenery, &frame, &trails, &options)?)
+    Ok(draw(scenery, frame, trails, &options)?)
 }
 
 /// Returns the tracks of the run in a folder as a drawing of some size, without title and small print, and the tracks

@@ -2,6 +2,9 @@
 //!
 //! Commands are the lines of blocks in the language `sh` that begin with `sidestep` or
 //! `cargo run --release --`. A block that no test can run is marked `sh ignore`, and its page says why.
+//!
+//! The pictures of a page are those that its commands make: `pictures/NAME.png` is `runs/NAME.png`, or the picture of
+//! the run in `runs/NAME`. `SIDESTEP_WRITE=pictures` renews them; a test of the studio makes that of its page.
 
 use crate::support::TestFolder;
 use serde_json::Value;
@@ -49,7 +52,8 @@ fn run_all(page: &Path) -> usize {
     }
     let binaries = Path::new(BINARY).parent().expect("a folder").display();
     let path = format!("{binaries}:{}", std::env::var("PATH").unwrap_or_default());
-    let mut all = commands(&std::fs::read_to_string(page).expect("the page"));
+    let text = std::fs::read_to_string(page).expect("the page");
+    let mut all = commands(&text);
     // They need a program that is not always built; the commands that read their folders go with them.
     let is_of_fleets = |line: &String| line.starts_with("sidestep fleet");
     if all.iter().any(is_of_fleets) && !crate::fleet::is_there() {
@@ -62,7 +66,103 @@ fn run_all(page: &Path) -> usize {
         let said = String::from_utf8_lossy(&ended.stderr);
         assert!(ended.status.success(), "{}: `{line}`: {said}", page.display());
     }
+    check_pictures(&text, place.path());
     all.len()
+}
+
+/// The folder of the pictures of all pages.
+const PICTURES: &str = "docs/src/pictures";
+/// The picture that a browser takes (`studio/tests/real/pictures.test.ts`).
+const OF_THE_STUDIO: &str = "studio";
+/// Largest difference of a color of two pixels that look alike, of 255.
+const MAX_DIFFERENCE: u8 = 24;
+/// Largest share of pixels of a picture that may look different, as letters of another version do.
+const MAX_DIFFERENT_SHARE: f64 = 0.003;
+
+/// Returns the names of the pictures that a page shows, without their endings.
+fn pictures(page: &str) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for image in page.split("![").skip(1) {
+        let target = image.split_once("](").and_then(|(_, rest)| rest.split_once(')'));
+        let file = target.and_then(|(target, _)| target.rsplit_once("pictures/"));
+        let name = file.and_then(|(_, file)| file.strip_suffix(".png"));
+        names.extend(name.map(str::to_string));
+    }
+    names
+}
+
+/// Returns the picture that the commands of a page have made under a name, if they have.
+fn picture_made(place: &Path, name: &str) -> Option<PathBuf> {
+    let runs = place.join("runs");
+    let candidates = [runs.join(format!("{name}.png")), runs.join(name).join("trajectories.png")];
+    candidates.into_iter().find(|path| path.is_file())
+}
+
+/// Compares the pictures of a page with those that its commands have made, or renews them.
+fn check_pictures(page: &str, place: &Path) {
+    for name in pictures(page) {
+        let Some(made) = picture_made(place, &name) else { continue };
+        let shown = root().join(PICTURES).join(format!("{name}.png"));
+        if std::env::var("SIDESTEP_WRITE").is_ok_and(|what| what == "pictures") {
+            std::fs::copy(&made, &shown).expect("a picture is written");
+            continue;
+        }
+        let share = different_share(&made, &shown);
+        assert!(
+            share <= MAX_DIFFERENT_SHARE,
+            "{PICTURES}/{name}.png is not what the commands of its page make: {:.1} % of its pixels differ; \
+             SIDESTEP_WRITE=pictures renews it",
+            100.0 * share
+        );
+    }
+}
+
+/// Returns the share of pixels that look different; all do where sizes differ.
+fn different_share(a: &Path, b: &Path) -> f64 {
+    let [a, b] = [a, b].map(|path| image::open(path).expect("a picture").to_rgb8());
+    if a.dimensions() != b.dimensions() {
+        return 1.0;
+    }
+    let is_different = |(a, b): &(&image::Rgb<u8>, &image::Rgb<u8>)| {
+        a.0.iter().zip(&b.0).any(|(a, b)| a.abs_diff(*b) > MAX_DIFFERENCE)
+    };
+    let different = a.pixels().zip(b.pixels()).filter(is_different).count();
+    different as f64 / f64::from(a.width() * a.height())
+}
+
+#[test]
+fn every_picture_is_made_by_a_command_of_a_page_that_shows_it() {
+    let mut pages = vec![root().join("README.md")];
+    let book = std::fs::read_dir(root().join("docs/src")).expect("the book");
+    pages.extend(book.map(|page| page.expect("an entry").path()).filter(|page| page.is_file()));
+    let texts: Vec<String> =
+        pages.iter().map(|page| std::fs::read_to_string(page).expect("text")).collect();
+    let is_made = |name: &str| {
+        let places = [format!("--out runs/{name}"), format!("--out runs/{name}.png")];
+        let is_one = |line: &String| {
+            places.iter().any(|place| line.ends_with(place) || line.contains(&format!("{place} ")))
+        };
+        texts.iter().any(|text| {
+            pictures(text).iter().any(|shown| shown == name) && commands(text).iter().any(is_one)
+        })
+    };
+    let mut checked = 0;
+    for entry in std::fs::read_dir(root().join(PICTURES)).expect("the pictures") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+        if name != OF_THE_STUDIO {
+            assert!(is_made(&name), "{name}: no page shows it beside the command that makes it");
+            checked += 1;
+        }
+    }
+    assert!(checked >= 5, "{checked}");
+}
+
+#[test]
+fn pictures_of_a_page_are_found_by_their_names() {
+    let page =
+        "a ![words](docs/src/pictures/office.png) b\n![w](pictures/plan.png)\n[no](pictures/x.png)";
+    assert_eq!(pictures(page), ["office", "plan"]);
 }
 
 #[test]

@@ -117,6 +117,61 @@ fn pictures_and_films_are_drawn() {
 }
 
 #[test]
+fn pictures_show_the_chosen_agents_and_cycles_in_the_chosen_size() {
+    let place = recorded();
+    for recording in ["r", "r.mcap"] {
+        let out = format!("{recording}.svg");
+        let options =
+            ["--to", "svg", "--agents", "0,2", "--cycles", "100:300", "--size", "800x500"];
+        place.json(&[&["export", recording, "--out", &out, "--replace"][..], &options].concat());
+        let svg = place.read(&out);
+        assert!(svg.contains("width=\"800\" height=\"500\""), "{svg}");
+        // The scenario has two sections of robots without names.
+        for words in [">robots 0 to 1: robot 0<", ">robots 2: robot 2<", ">other robot (1)<"] {
+            assert!(svg.contains(words), "{recording}: {words}: {svg}");
+        }
+        assert!(svg.contains("Tracks of 2 of 3 robots (the others pale), cycles 100 to 300."));
+        assert_eq!(svg.matches("class=\"trail\"").count(), 2, "{recording}");
+        assert!(svg.contains(">person<") && !svg.contains("mobile object"));
+    }
+    place.json(&["export", "r", "--to", "csv", "--table", "trajectories", "--cycles", "5:6"]);
+    let rows = place.read("r-trajectories.csv");
+    let cycles = rows.lines().skip(1).filter_map(|row| row.split(',').next());
+    assert!(
+        cycles.clone().count() > 0 && cycles.into_iter().all(|cycle| ["5", "6"].contains(&cycle))
+    );
+    let size = ["--size", "400x300", "--every", "50", "--out", "r.gif"];
+    place.json(&[&["export", "r", "--to", "gif", "--cycles", "100:300"][..], &size].concat());
+    let bytes = std::fs::read(place.path("r.gif")).expect("a film");
+    let sides = [6, 8].map(|at| u16::from_le_bytes([bytes[at], bytes[at + 1]]));
+    assert_eq!(sides, [400, 300]);
+}
+
+#[test]
+fn options_of_pictures_that_fit_nothing_are_told_with_what_fits() {
+    let place = recorded();
+    let told = |options: &[&str]| {
+        let ended = place.run(&[&["export", "r", "--out", "no"][..], options].concat());
+        assert_ne!(ended.code(), 0, "{options:?}");
+        assert!(!place.path("no").exists(), "{options:?}");
+        ended.err()
+    };
+    let cases: [(&[&str], &str); 7] = [
+        (&["--to", "png", "--view", "left"], "top, side, front"),
+        (&["--to", "png", "--view", "side"], "give top, or leave it out"),
+        (&["--to", "svg", "--agents", "7"], "their numbers are 0 to 2"),
+        (&["--to", "csv", "--agents", "1"], "--agents"),
+        (&["--to", "gif", "--cycles", "1:2", "--from", "1"], "leave one of them out"),
+        (&["--to", "png", "--size", "800x600", "--width", "800"], "leave one of them out"),
+        (&["--to", "mp4-frames", "--size", "801x600"], "give --size 800x600"),
+    ];
+    for (options, words) in cases {
+        let said = told(options);
+        assert!(said.contains(words), "{options:?}: {said}");
+    }
+}
+
+#[test]
 fn a_page_is_one_file_that_names_no_folder_and_lets_nothing_out() {
     let place = recorded();
     let made =

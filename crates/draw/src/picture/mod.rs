@@ -248,12 +248,14 @@ fn on_sheet(
     let [lo, hi] = projected_bounds(camera, box_m);
     let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
     let px = px_per_m(scene, size_m, &options.style);
+    let caption = format!("{}{}", space::describe_cut(scene), options.caption);
     let area = SheetContent {
         origin_m: lo,
         size_m,
         axes,
+        min_width_px: options.size_px.map_or(0.0, |[width, _]| f64::from(width)),
         title: &options.title,
-        caption: &options.caption,
+        caption: &caption,
     };
     let mut svg = Svg::default();
     let sheet = Sheet::open(&mut svg, &area, &options.style, px);

@@ -1,13 +1,14 @@
 //! The floor of the shown box, and the shadows on it, by which depths are seen.
 
 use super::Scene;
-use super::canvas::{Canvas, Px};
+use super::canvas::{Canvas, Px, corners};
 use super::extent::BoxM;
 use crate::style::GRID;
 use crate::svg::{Svg, SvgNumber};
 use crate::ticks::nice_step;
+use sidestep_kernel::geometry::cross_2d;
 use sidestep_kernel::math::{cos, sin};
-use sidestep_kernel::view::{Body, Shape, Vec3};
+use sidestep_kernel::view::{Body, BodyKind, Shape, Vec3};
 use std::fmt::Write as _;
 
 /// Corners of the shadow of a ball.
@@ -45,23 +46,61 @@ fn multiples(from: f64, until: f64, step: f64) -> impl Iterator<Item = f64> {
 
 /// Draws the shadows of balls and of agents, cast straight down.
 pub(super) fn draw_shadows(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas, floor_m: f64) {
-    let mut balls = String::new();
-    for ball in scene.surroundings.balls() {
-        if let Shape::Sphere { radius_m } = ball.shape {
-            balls += &disc(ball.pose.at_m, radius_m, canvas, floor_m);
+    let visible = scene.visible();
+    let obstacles = visible.iter().filter(|body| body.kind == BodyKind::OBSTACLE);
+    let mut data = String::new();
+    for body in obstacles.clone() {
+        match &body.shape {
+            Shape::Sphere { radius_m } | Shape::Cylinder { radius_m, .. } => {
+                data += &disc(body.pose.at_m, *radius_m, canvas, floor_m);
+            }
+            Shape::Cuboid { size_m } => data += &cuboid(body, *size_m, canvas, floor_m),
+            Shape::Line { .. } | Shape::Dart { .. } => {}
         }
     }
     // One path, so that shadows that overlap are no darker.
-    if !balls.is_empty() {
-        svg.path(&balls, r##"class="shadow" fill="#000000" fill-opacity="0.07""##);
+    if !data.is_empty() {
+        svg.path(&data, r##"class="shadow" fill="#000000" fill-opacity="0.07""##);
     }
-    let agents = scene.frame.bodies.iter().filter(|body| body.kind.is_of_agent());
-    for body in agents {
-        draw_shadow(svg, canvas, body, floor_m);
+    for body in obstacles {
+        draw_line(svg, canvas, body, (floor_m, 0.07));
+    }
+    for body in visible.iter().filter(|body| body.kind.is_of_agent()) {
+        draw_line(svg, canvas, body, (floor_m, 0.22));
     }
 }
 
-fn draw_shadow(svg: &mut Svg, canvas: &Canvas, body: &Body, floor_m: f64) {
+/// Returns the shadow of a box: the hull of its corners.
+fn cuboid(body: &Body, size_m: Vec3, canvas: &Canvas, floor_m: f64) -> String {
+    let half = size_m.map(|side_m| 0.5 * side_m);
+    let corners = corners([half.map(|m| -m), half]).map(|corner| body.pose.transform_point(corner));
+    let hull = hull(corners.map(|[x, y, _]| [x, y]).to_vec());
+    polygon(hull.into_iter().map(|[x, y]| canvas.px([x, y, floor_m])))
+}
+
+/// Returns the corners of the smallest convex polygon around points, by Andrew's monotone chains.
+fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    let mut hull: Vec<[f64; 2]> = Vec::new();
+    let upper: Vec<[f64; 2]> = points.iter().rev().copied().collect();
+    for side in [points, upper] {
+        let begin = hull.len();
+        for point in side {
+            while let [.., a, b] = hull[begin..]
+                && cross_2d([b[0] - a[0], b[1] - a[1]], [point[0] - b[0], point[1] - b[1]]) <= 0.0
+            {
+                hull.pop();
+            }
+            hull.push(point);
+        }
+        // The last point begins the other side.
+        hull.pop();
+    }
+    hull
+}
+
+/// Draws the shadow of a line, with an opacity.
+fn draw_line(svg: &mut Svg, canvas: &Canvas, body: &Body, (floor_m, opacity): (f64, f64)) {
     let Shape::Line { points_m, thickness_m } = &body.shape else { return };
     let mut data = String::new();
     for (k, at) in points_m.iter().enumerate() {
@@ -74,7 +113,7 @@ fn draw_shadow(svg: &mut Svg, canvas: &Canvas, body: &Body, floor_m: f64) {
     svg.path(
         &data,
         format_args!(
-            r##"class="shadow" fill="none" stroke="#000000" stroke-opacity="0.22" stroke-width="{width}" stroke-linecap="round" stroke-linejoin="round""##
+            r##"class="shadow" fill="none" stroke="#000000" stroke-opacity="{opacity}" stroke-width="{width}" stroke-linecap="round" stroke-linejoin="round""##
         ),
     );
 }
@@ -95,4 +134,21 @@ fn polygon(points: impl IntoIterator<Item = Px>) -> String {
         let _ = write!(data, "{command}{} {}", SvgNumber(x), SvgNumber(y));
     }
     data + "Z"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hull_has_the_corners_around_all_points() {
+        let points = vec![[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [2.0, 2.0], [0.0, 2.0], [1.0, 0.0]];
+        assert_eq!(hull(points), [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]);
+    }
+
+    #[test]
+    fn lines_of_the_floor_are_at_round_coordinates() {
+        assert_eq!(multiples(-3.0, 7.0, 5.0).collect::<Vec<_>>(), [0.0, 5.0]);
+        assert_eq!(multiples(1.0, 4.0, 5.0).count(), 0);
+    }
 }

@@ -28,6 +28,8 @@ pub(super) struct SheetContent<'a> {
     pub(super) size_m: [f64; 2],
     /// The names of the horizontal and the vertical axis.
     pub(super) axes: [&'static str; 2],
+    /// Least width of all of it: with more room, the legend has fewer rows, and the map is in the middle.
+    pub(super) min_width_px: f64,
     pub(super) title: &'a str,
     pub(super) caption: &'a str,
 }
@@ -41,6 +43,8 @@ pub(super) struct Sheet {
     axes: [&'static str; 2],
     unit: (&'static str, f64),
     width: f64,
+    /// Distance of the label of the vertical axis from the picture's left edge.
+    label_x: f64,
     /// Length by which the label of a low map's vertical axis extends above and below it.
     spill: f64,
 }
@@ -83,19 +87,22 @@ impl Sheet {
         let map_width = width * px;
         let map_height = height * px;
         let min_letters = MIN_WIDTH_LETTERS[usize::from(area.title.is_empty())];
-        let width = (left + map_width + 2.0 * EDGE_PX + size).max(min_letters * style.font_px);
+        let own_width = left + map_width + 2.0 * EDGE_PX + size;
+        let width = own_width.max(min_letters * style.font_px).max(area.min_width_px);
+        let aside = if area.min_width_px > 0.0 { 0.5 * (width - own_width) } else { 0.0 };
         let lines = text::wrap(area.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
         let top = paragraph(svg, &lines, (EDGE_PX, EDGE_PX), &title_style(style.title_px()));
         // The label of the y axis may be longer than a low map: it then needs space above and below.
         let spill = ((Y_LABEL_LETTERS * style.font_px - map_height) / 2.0).max(0.0);
         // Whole pixels, for sharp edges.
         let map = Rect {
-            x: left.ceil(),
+            x: (left + aside).ceil(),
             y: (top + spill + 8.0).ceil(),
             width: map_width,
             height: map_height,
         };
-        let sheet = Self { map, px, axes: area.axes, unit, width, spill };
+        let label_x = EDGE_PX + aside;
+        let sheet = Self { map, px, axes: area.axes, unit, width, label_x, spill };
         sheet.draw_across(svg, style, &across);
         sheet.draw_upward(svg, style, &upward);
         sheet
@@ -159,7 +166,12 @@ impl Sheet {
         let text_style =
             TextStyle { upward: true, ..TextStyle::new(style.font_px, Anchor::Middle) };
         let words = format!("{} ({})", self.axes[1], self.unit.0);
-        svg.text(EDGE_PX + style.font_px, self.map.y + self.map.height / 2.0, &words, &text_style);
+        svg.text(
+            self.label_x + style.font_px,
+            self.map.y + self.map.height / 2.0,
+            &words,
+            &text_style,
+        );
     }
 
     /// Draws a bar of round length, about a fifth of the map's longer side but less than half the

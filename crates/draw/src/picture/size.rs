@@ -45,12 +45,13 @@ fn fit_layout(
     draw: &impl Fn(&PictureOptions) -> Result<String, DrawError>,
 ) -> Result<Option<String>, DrawError> {
     let mut room_px = layout_px;
+    let size_px = Some(layout_px.map(|px| px.floor() as u32));
     for _ in 0..MAX_LAYOUTS {
         let style = Style { width_px: room_px[0], height_px: room_px[1], ..options.style };
         if style.check().is_err() {
             return Ok(None);
         }
-        let svg = draw(&PictureOptions { style, ..options.clone() })?;
+        let svg = draw(&PictureOptions { style, size_px, ..options.clone() })?;
         let Some(taken_px) = page_size(&svg) else { return Ok(None) };
         let excess_px = [0, 1].map(|k| (taken_px[k] - layout_px[k]).max(0.0));
         if excess_px == [0.0; 2] {

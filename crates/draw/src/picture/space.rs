@@ -34,7 +34,7 @@ pub(super) fn draw(scene: &Scene<'_>, options: &PictureOptions) -> Result<String
     let legend = Legend::new(map_legend::legend_entries(scene), style.small_px(), text_width_px);
     legend.draw(&mut svg, EDGE_PX, area.bottom());
     let top = area.bottom() + legend.height_px() + 4.0;
-    let words = format!("{}{} {}", describe_box(box_m), describe_cut(scene), options.caption);
+    let words = format!("{} {}{}", describe_box(box_m), describe_cut(scene), options.caption);
     let lines = text::wrap(&words, style.small_px(), Weight::Regular, text_width_px);
     let end = paragraph(&mut svg, &lines, (EDGE_PX, top), &small_print_style(style.small_px()));
     Ok(svg.finish(style.width_px, end + EDGE_PX, &options.title))
@@ -211,15 +211,15 @@ fn describe_box([lo, hi]: [Vec3; 2]) -> String {
     format!("Shown: {}.", axes.join(", "))
 }
 
-/// Describes what of the balls is shown; empty if all are.
-fn describe_cut(scene: &Scene<'_>) -> String {
+/// Describes what of the balls is shown, before other words; empty if all are.
+pub(super) fn describe_cut(scene: &Scene<'_>) -> String {
     let Some((near_m, shown, all)) = scene.surroundings.cut() else { return String::new() };
     let digits = decimals(nice_step(near_m, 100));
     let shown = group_thousands(&shown.to_string());
     let all = group_thousands(&all.to_string());
     let near = label(near_m, digits);
     format!(
-        " Of {all} balls, the {shown} within {near} m of an agent are drawn; those before one let it show through."
+        "Of {all} balls, the {shown} within {near} m of an agent are drawn; those before one let it show through. "
     )
 }
 

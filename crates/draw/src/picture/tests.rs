@@ -1,13 +1,15 @@
 //! Tests of pictures: which parts they show, where, and in which colors.
 
-use super::{PictureOptions, draw};
+use super::{PictureOptions, TrailChoice, describe, draw};
+use crate::error::DrawError;
 use crate::raster::to_png;
 use crate::style::hex;
-use crate::testing::{ball, moment, open};
+use crate::testing::{ball, moment, open, plane};
 use sidestep_airspace::kinds::{AIRPLANE, START, ZONE};
 use sidestep_chain::kinds::{CONNECTOR, RODS};
 use sidestep_kernel::view::{
-    BODY_COLORS, Body, BodyCondition, BodyKind, Frame, Pose, Scenery, Shape, Vec3, WALL_COLOR,
+    AgentGroup, AgentNumber, BODY_COLORS, Body, BodyCondition, BodyKind, Frame, Pose, Scenery,
+    Shape, Trail, Vec3, WALL_COLOR,
 };
 use sidestep_robots::kinds::{DOOR, PERSON, ROBOT};
 
@@ -130,7 +132,11 @@ fn near_things_are_drawn_over_far_ones() {
     let to_eye = super::canvas::Camera::CORNER.to_eye;
     let at = |k: u32| -> Vec3 { to_eye.map(|x| x * -f64::from(k)) };
     let frame = moment((0..4).map(|k| ball(CONNECTOR, k, at(k), 1.0).with_part(1)).collect());
-    let svg = picture(&open(3), &frame);
+    let scenery = open(3);
+    // The angles of that direction.
+    let view = "-53.13,36.87".parse().unwrap();
+    let options = PictureOptions { view, ..PictureOptions::page(&scenery, "") };
+    let svg = draw(&scenery, &frame, &[], &options).unwrap();
     let place =
         |k: usize| svg.find(&format!(r#"fill="{}""#, hex(BODY_COLORS[k]))).expect("a connector");
     assert!((0..3).all(|k| place(k) > place(k + 1)), "{svg}");
@@ -180,4 +186,118 @@ fn thick_parts_in_space_have_a_seam_and_thin_ones_none() {
         svg.matches(r##"stroke="#FFFFFF" stroke-width"##).count()
     };
     assert_eq!([seams(3, 0.1), seams(3, 0.001), seams(2, 0.1)], [1, 0, 0]);
+}
+
+/// Robots in two groups, on a floor.
+fn two_groups() -> (Scenery, Frame) {
+    let group = |name: &str, numbers| AgentGroup { name: name.into(), kind: ROBOT, numbers };
+    let groups = vec![group("couriers", 0..2), group("cleaners", 2..5)];
+    let robot = |k: u32| {
+        let shape = Shape::Cuboid { size_m: [1.0; 3] };
+        Body::new(ROBOT, k, Pose::from_position([2.0 * f64::from(k) + 1.0, 2.0, 0.5]), shape)
+    };
+    (Scenery { groups, ..plane(12, 6) }, moment((0..5).map(robot).collect()))
+}
+
+fn count(svg: &str, words: &str) -> usize {
+    svg.matches(words).count()
+}
+
+#[test]
+fn robots_have_the_color_of_their_group_and_the_legend_names_it() {
+    let (scenery, frame) = two_groups();
+    let svg = picture(&scenery, &frame);
+    let fill = |index: usize| format!("fill=\"{}\"", hex(BODY_COLORS[index]));
+    // Each robot, and the legend.
+    assert_eq!((count(&svg, &fill(0)), count(&svg, &fill(1))), (3, 4), "{svg}");
+    assert!(svg.contains(">couriers (2 robots)<") && svg.contains(">cleaners (3 robots)<"));
+    assert!(!svg.contains(">robot 0<"));
+    let one = Scenery { groups: scenery.groups[..1].to_vec(), ..scenery };
+    let svg = picture(&one, &frame);
+    assert_eq!(count(&svg, &fill(2)), 1, "a single group does not make all alike: {svg}");
+}
+
+#[test]
+fn chosen_agents_stand_out_from_the_others() {
+    let (scenery, frame) = two_groups();
+    let agents = vec![AgentNumber { number: 3, part: None }];
+    let trails = TrailChoice { agents, from: Some(7) };
+    let way = (0..20).map(|cycle| (cycle, [7.0, 1.0 + 0.2 * cycle as f64, 0.5])).collect();
+    let trail = Trail { of: frame.bodies[3].id(), points: way };
+    let other = Trail { of: frame.bodies[0].id(), points: vec![(9, [1.0, 2.0, 0.5])] };
+    let options = PictureOptions { trails: trails.clone(), ..PictureOptions::page(&scenery, "") };
+    let svg = draw(&scenery, &frame, &[trail.clone(), other.clone()], &options).unwrap();
+    assert!(svg.contains(">cleaners: robot 3<") && svg.contains(">other robots (4)<"), "{svg}");
+    assert_eq!(count(&svg, "class=\"trail\""), 1, "only the chosen one has a trail");
+    assert_eq!(count(&svg, &format!("fill=\"{}\"", hex(BODY_COLORS[1]))), 2, "it, and the legend");
+    let words = describe(&scenery, &frame, &[trail, other], &trails);
+    assert_eq!(words, "Tracks of 1 of 5 robots (the others pale), cycles 7 to 0.");
+}
+
+#[test]
+fn a_picture_of_some_size_has_exactly_that_and_all_of_its_words() {
+    let (scenery, frame) = two_groups();
+    for size_px in [[900, 500], [300, 700], [1800, 1000]] {
+        let page = PictureOptions::page(&scenery, "Small print.");
+        let options = PictureOptions { size_px: Some(size_px), ..page };
+        let svg = draw(&scenery, &frame, &[], &options).unwrap();
+        let [width, height] = size_px;
+        assert!(svg.contains(&format!("width=\"{width}\" height=\"{height}\"")), "{svg}");
+        assert!(svg.contains("Small print.") && svg.contains(">couriers (2 robots)<"), "{svg}");
+        let png = to_png(&svg, width.max(height)).unwrap();
+        let picture = image::load_from_memory(&png).unwrap().to_rgb8();
+        assert_eq!(picture.dimensions(), (width, height));
+        assert_eq!(picture.get_pixel(0, 0).0, [255; 3], "the ground covers all of it");
+    }
+}
+
+/// Balls at the corners of a cube of 4 m, each of its own number.
+fn cube() -> (Scenery, Frame) {
+    let at = |k: u32| [0, 1, 2].map(|axis| 4.0 * f64::from(k >> axis & 1));
+    let bodies = (0..8).map(|k| ball(CONNECTOR, k, at(k), 0.5)).collect();
+    (Scenery { name: String::new(), ..open(3) }, moment(bodies))
+}
+
+#[test]
+fn named_views_show_two_axes_with_a_scale_and_others_three() {
+    let (scenery, frame) = cube();
+    let shown = |view: &str| {
+        let view = view.parse().unwrap();
+        let options = PictureOptions { view, ..PictureOptions::page(&scenery, "") };
+        draw(&scenery, &frame, &[], &options).unwrap()
+    };
+    for (view, axes) in [("top", ["x", "y"]), ("side", ["y", "z"]), ("front", ["x", "z"])] {
+        let svg = shown(view);
+        assert!(axes.iter().all(|axis| svg.contains(&format!(">{axis} (m)<"))), "{view}: {svg}");
+        assert_eq!(count(&svg, " (m)<"), 2, "{view}");
+        assert!(svg.contains("scale-bar"), "{view}");
+    }
+    assert_eq!(count(&shown("30,20"), " (m)<"), 3);
+    // Seen from the front, what is far has a higher y; from the other side it is in front.
+    let order =
+        |svg: &str, index: usize| svg.find(&format!("fill=\"{}\"", hex(BODY_COLORS[index])));
+    let front = shown("front");
+    assert!(order(&front, 2) < order(&front, 0), "far ones are drawn first");
+    let back = shown("90,0.1");
+    assert!(order(&back, 2) > order(&back, 0));
+    let flat = Scenery { dimensions: 2, ..scenery.clone() };
+    let side = PictureOptions { view: "side".parse().unwrap(), ..PictureOptions::page(&flat, "") };
+    assert!(matches!(draw(&flat, &frame, &[], &side), Err(DrawError::FlatView(_))));
+}
+
+#[test]
+fn balls_before_a_snake_let_it_show_through_and_all_cast_shadows() {
+    let snake: Vec<Body> =
+        (0..10).map(|k| ball(CONNECTOR, 0, [f64::from(k), 0.0, 0.0], 0.1).with_part(k)).collect();
+    let at = |k: u32, place| ball(BodyKind::OBSTACLE, k, place, 0.4);
+    let near = vec![at(0, [3.0, -0.8, 0.0]), at(1, [6.0, 0.8, 0.0])];
+    let far = (2..100).map(|k| at(k, [f64::from(k % 10), f64::from(k / 10) + 5.0, 3.0]));
+    let scenery = Scenery { bodies: near.into_iter().chain(far).collect(), ..open(3) };
+    let view = "-90,5".parse().unwrap();
+    let options = PictureOptions { view, ..PictureOptions::page(&scenery, "") };
+    let svg = draw(&scenery, &moment(snake), &[], &options).unwrap();
+    assert_eq!((count(&svg, "class=\"hides\""), count(&svg, "class=\"ball\"")), (1, 1), "{svg}");
+    assert!(svg.contains("Of 100 balls, the 2 within 0.80 m of an agent are drawn"), "{svg}");
+    assert_eq!(count(&svg, "class=\"shadow\""), 1, "the shadows of balls are one path");
+    assert_eq!(count(&svg, "class=\"floor\""), 1);
 }

@@ -4,12 +4,13 @@ use super::target::Target;
 use super::{AnimationOptions as Options, ExportContext, ExportResult};
 use crate::driver::Sinks;
 use crate::frame_sink::{AnimationFrames, write_gif};
-use crate::picture::{draw_svg, footnote};
+use crate::picture::{draw_moment, draw_svg, footnote};
+use crate::run_tables::has_rows;
 use crate::watcher::{Progress, ProgressGuard};
 use crate::{Error, Watcher};
 use sidestep_draw::{AnimationFrame, AnimationRenderer, AnimationSize, to_png};
-use sidestep_kernel::Cycle;
-use sidestep_kernel::view::FrameOptions;
+use sidestep_kernel::view::{FrameOptions, Trail};
+use sidestep_kernel::{Cycle, Simulation};
 use std::io::Write;
 use std::path::Path;
 
@@ -17,6 +18,8 @@ use std::path::Path;
 const MAX_FRAMES: Cycle = 150;
 /// Fast enough for the eye to join the frames, and slow enough that 150 of them show a whole run.
 const DEFAULT_FPS: u16 = 15;
+/// Number of cycles of tracks in a picture of a run without recorded places: as many as can be read on a floor.
+const SAMPLED_CYCLES: Cycle = 400;
 // A GIF is mostly shown inside a page and grows with its area; frames are material for videos, and a PNG is one
 // picture.
 const DEFAULT_GIF_WIDTH_PX: u16 = 640;
@@ -46,10 +49,22 @@ fn export_picture(
     encode: impl FnOnce(String) -> Result<Vec<u8>, Error>,
 ) -> Result<ExportResult, Error> {
     let target = Target::for_file(job, ending)?;
-    let mut run = job.run_up_to(job.wanted.from.unwrap_or(job.span.until))?;
+    let cycle = job.wanted.from.unwrap_or(job.span.until);
+    let from = job.look.trails_from.unwrap_or(cycle.saturating_sub(SAMPLED_CYCLES)).min(cycle);
+    let has_rows = job.has_positions()?;
+    let mut run = job.run_up_to(if has_rows { cycle } else { from })?;
+    let sampled = if has_rows { None } else { Some(job.sample_trails(run.as_mut(), cycle)?) };
     let is_confirmed = job.recorded.verify_digest(run.as_ref())?;
     let origin = format!("Cycle {}. {}", run.cycle(), footnote(run.as_ref()));
-    let svg = draw_svg(run.as_mut(), job.recorded.folder.as_deref(), &origin, &job.look)?;
+    let svg = match sampled {
+        None => draw_svg(run.as_mut(), job.recorded.folder.as_deref(), &origin, &job.look)?,
+        Some(trails) => {
+            let scenery = run.scenery();
+            let frame = run.frame(FrameOptions::WITHOUT_SCANS);
+            job.look.check(&scenery, &frame)?;
+            draw_moment(&scenery, &frame, &trails, (&origin, &job.look))?
+        }
+    };
     let bytes = encode(svg)?;
     target.write_stream(|file| file.write_all(&bytes))?;
     Ok(ExportResult::single_file(target.path(), is_confirmed))
@@ -74,6 +89,22 @@ pub(super) fn export_frames(
 }
 
 impl ExportContext<'_> {
+    /// Returns whether places are recorded: an MCAP file has none, nor a run that was told to keep none.
+    fn has_positions(&self) -> Result<bool, Error> {
+        let Some(folder) = self.recorded.folder.as_deref() else { return Ok(false) };
+        let start = self.recorded.start(1)?;
+        Ok(start.position_columns().iter().any(|rows| has_rows(folder, rows.table)))
+    }
+
+    /// Drives the run to a cycle, and returns the tracks since its present one.
+    fn sample_trails(&self, run: &mut dyn Simulation, until: Cycle) -> Result<Vec<Trail>, Error> {
+        let cycles = until.saturating_sub(run.cycle());
+        let mut frames = AnimationFrames::new(run, cycles.max(1), cycles, &self.look);
+        let sinks = Sinks { frames: Some(&mut frames), ..Sinks::default() };
+        self.drive(run, until, sinks)?;
+        Ok(frames.last_trails())
+    }
+
     /// Returns the size of an animation: a given one, or a longer side.
     fn animation_size(&self, longer_px: Option<u16>, default_px: u16) -> AnimationSize {
         match self.look.size_px {

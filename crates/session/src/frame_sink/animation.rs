@@ -98,6 +98,13 @@ impl AnimationFrames {
         Trail { of, points: places[begin..end.max(begin)].to_vec() }
     }
 
+    /// Returns the tracks up to the last frame: since the first one, if there are few.
+    pub(crate) fn last_trails(&self) -> Vec<Trail> {
+        let Some(last) = self.frames.len().checked_sub(1) else { return Vec::new() };
+        let whose = bodies_with_trails(&self.scenery, &self.frames[last], &self.choice);
+        whose.into_iter().map(|of| self.trail(of, last)).collect()
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.frames.len()
     }
