@@ -134,6 +134,14 @@ impl Legend {
         Self { placed, font_px }
     }
 
+    /// Returns the width of a legend with one entry in each row.
+    pub(crate) fn column_px(entries: &[LegendEntry], font_px: f64) -> f64 {
+        let width = |entry: &LegendEntry| {
+            text::width(&entry.label, font_px, Weight::Regular) + 2.8 * font_px
+        };
+        entries.iter().map(width).fold(0.0, f64::max)
+    }
+
     fn row_px(&self) -> f64 {
         self.font_px * 1.6
     }

@@ -41,7 +41,7 @@ use crate::style::{INK, Style};
 use crate::svg::Svg;
 use canvas::{Camera, Canvas};
 use palette::Palette;
-use sheet::{Sheet, SheetContent};
+use sheet::{LegendPlace, Sheet, SheetContent};
 use sidestep_kernel::view::{Body, Frame, Scenery, Trail};
 use surroundings::Surroundings;
 use trails::DrawnTrail;
@@ -104,8 +104,10 @@ pub fn draw(
     check_view(scenery, options.view)?;
     let scene = Scene::new(scenery, frame, trails, &options.trails);
     match options.size_px {
-        Some(size_px) => size::fit(size_px, options, |options| draw_scene(&scene, options)),
-        None => draw_scene(&scene, options),
+        Some(size_px) => {
+            size::fit(size_px, options, &|options, legend| draw_scene(&scene, options, legend))
+        }
+        None => draw_scene(&scene, options, LegendPlace::Below).map(|drawn| drawn.svg),
     }
 }
 
@@ -118,12 +120,22 @@ pub(crate) fn check_view(scenery: &Scenery, view: PictureView) -> Result<(), Dra
     Ok(())
 }
 
-fn draw_scene(scene: &Scene<'_>, options: &PictureOptions) -> Result<String, DrawError> {
+/// A picture, and the scale of what it shows.
+pub(crate) struct DrawnPicture {
+    svg: String,
+    px_per_m: f64,
+}
+
+fn draw_scene(
+    scene: &Scene<'_>,
+    options: &PictureOptions,
+    legend: LegendPlace,
+) -> Result<DrawnPicture, DrawError> {
     if scene.is_plane() {
-        return on_sheet(scene, options, (["x", "y"], Camera::ABOVE));
+        return on_sheet(scene, options, (["x", "y"], Camera::ABOVE), legend);
     }
     match options.view.two_axes() {
-        Some(side) => on_sheet(scene, options, side),
+        Some(side) => on_sheet(scene, options, side, legend),
         None => space::draw(scene, options),
     }
 }
@@ -243,7 +255,8 @@ fn on_sheet(
     scene: &Scene<'_>,
     options: &PictureOptions,
     (axes, camera): ([&'static str; 2], Camera),
-) -> Result<String, DrawError> {
+    legend: LegendPlace,
+) -> Result<DrawnPicture, DrawError> {
     let box_m = extent::scene_bounds(scene)?;
     let [lo, hi] = projected_bounds(camera, box_m);
     let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
@@ -254,6 +267,8 @@ fn on_sheet(
         size_m,
         axes,
         min_width_px: options.size_px.map_or(0.0, |[width, _]| f64::from(width)),
+        legend,
+        entries: map_legend::legend_entries(scene),
         title: &options.title,
         caption: &caption,
     };
@@ -272,7 +287,7 @@ fn on_sheet(
     svg.close_group();
     svg.rect(sheet.map, format_args!(r#"fill="none" stroke="{INK}""#));
     labels::draw(&mut svg, scene, &canvas, sheet.map, &options.style);
-    Ok(sheet.close(svg, &area, map_legend::legend_entries(scene), &options.style))
+    Ok(DrawnPicture { svg: sheet.close(svg, area, &options.style), px_per_m: px })
 }
 
 /// Returns the scale at which everything fits the style's size; whole pixels per box if boxes are

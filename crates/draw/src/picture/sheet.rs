@@ -8,6 +8,8 @@ use crate::ticks::{LabelSpacing, Ticks, decimals, label, nice_step};
 
 pub(super) const EDGE_PX: f64 = 10.0;
 const TICK_PX: f64 = 4.0;
+/// Gap between the map and a legend beside it.
+const COLUMN_GAP_PX: f64 = 16.0;
 /// The length of "y (m)" in letter sizes.
 const Y_LABEL_LETTERS: f64 = 3.0;
 /// Least width of a picture, in letters, to make room for title and legend, and for a legend alone.
@@ -30,8 +32,20 @@ pub(super) struct SheetContent<'a> {
     pub(super) axes: [&'static str; 2],
     /// Least width of all of it: with more room, the legend has fewer rows, and the map is in the middle.
     pub(super) min_width_px: f64,
+    /// Where the legend stands.
+    pub(super) legend: LegendPlace,
+    pub(super) entries: Vec<LegendEntry>,
     pub(super) title: &'a str,
     pub(super) caption: &'a str,
+}
+
+/// Where the legend of a sheet stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LegendPlace {
+    /// Below the map, in rows.
+    Below,
+    /// On the right of the map, in a column.
+    Beside,
 }
 
 /// The position of the map in the picture.
@@ -87,7 +101,11 @@ impl Sheet {
         let map_width = width * px;
         let map_height = height * px;
         let min_letters = MIN_WIDTH_LETTERS[usize::from(area.title.is_empty())];
-        let own_width = left + map_width + 2.0 * EDGE_PX + size;
+        let column_px = match area.legend {
+            LegendPlace::Below => 0.0,
+            LegendPlace::Beside => COLUMN_GAP_PX + Legend::column_px(&area.entries, size),
+        };
+        let own_width = left + map_width + column_px + 2.0 * EDGE_PX + size;
         let width = own_width.max(min_letters * style.font_px).max(area.min_width_px);
         let aside = if area.min_width_px > 0.0 { 0.5 * (width - own_width) } else { 0.0 };
         let lines = text::wrap(area.title, style.title_px(), Weight::Bold, width - 2.0 * EDGE_PX);
@@ -109,21 +127,26 @@ impl Sheet {
     }
 
     /// Draws everything below the map and finishes the picture.
-    pub(super) fn close(
-        &self,
-        mut svg: Svg,
-        area: &SheetContent<'_>,
-        entries: Vec<LegendEntry>,
-        style: &Style,
-    ) -> String {
+    pub(super) fn close(&self, mut svg: Svg, area: SheetContent<'_>, style: &Style) -> String {
         let axis_px = TICK_PX + style.small_px() + 1.6 * style.font_px + 14.0;
         let top = self.map.bottom() + axis_px.max(self.spill + 8.0);
         let bar_px = self.draw_scale_bar(&mut svg, style, top);
-        let left = self.map.x + bar_px + 2.0 * style.font_px;
-        let legend = Legend::new(entries, style.small_px(), self.width - left - EDGE_PX);
-        legend.draw(&mut svg, left, top - 4.0);
-        let top = top + legend.height_px().max(2.4 * style.small_px()) + 6.0;
         let size = style.small_px();
+        let scale_px = 2.4 * size;
+        let top = match area.legend {
+            LegendPlace::Below => {
+                let left = self.map.x + bar_px + 2.0 * style.font_px;
+                let legend = Legend::new(area.entries, size, self.width - left - EDGE_PX);
+                legend.draw(&mut svg, left, top - 4.0);
+                top + legend.height_px().max(scale_px) + 6.0
+            }
+            LegendPlace::Beside => {
+                let column_px = Legend::column_px(&area.entries, size);
+                let legend = Legend::new(area.entries, size, column_px);
+                legend.draw(&mut svg, self.map.right() + COLUMN_GAP_PX, self.map.y);
+                (top + scale_px).max(self.map.y + legend.height_px()) + 6.0
+            }
+        };
         let lines = text::wrap(area.caption, size, Weight::Regular, self.width - 2.0 * EDGE_PX);
         let end = paragraph(&mut svg, &lines, (EDGE_PX, top), &small_print_style(size));
         svg.finish(self.width, end + EDGE_PX, area.title)

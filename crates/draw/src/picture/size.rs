@@ -1,6 +1,7 @@
 //! Pictures of exactly some size, with all their words.
 
-use super::PictureOptions;
+use super::sheet::LegendPlace;
+use super::{DrawnPicture, PictureOptions};
 use crate::error::DrawError;
 use crate::style::Style;
 use crate::svg::{on_page, page_size};
@@ -10,15 +11,18 @@ const ENLARGEMENTS: [f64; 5] = [1.0, 1.3, 1.7, 2.2, 3.0];
 /// Most layouts that are tried for one size: the room that words take is known after the first, but for line breaks.
 const MAX_LAYOUTS: usize = 5;
 
-/// Draws a picture of exactly some size: as large as it can be in there, in the middle. It is laid out in that size, but
-/// no larger than the style's, with which its words would be tiny beside it.
+/// Draws a picture in the layout of the options, with its legend somewhere.
+type DrawLayout<'a> = dyn Fn(&PictureOptions, LegendPlace) -> Result<DrawnPicture, DrawError> + 'a;
+
+/// Draws a picture of exactly some size: as large as it can be in there, in the middle, with the legend where that leaves
+/// more room. It is laid out in that size, but no larger than the style's, with which its words would be tiny beside it.
 ///
 /// # Errors
 /// When its words leave no room for it, or it cannot be drawn at all.
 pub(super) fn fit(
     [width_px, height_px]: [u32; 2],
     options: &PictureOptions,
-    draw: impl Fn(&PictureOptions) -> Result<String, DrawError>,
+    draw: &DrawLayout<'_>,
 ) -> Result<String, DrawError> {
     let size_px = [f64::from(width_px), f64::from(height_px)];
     let longer_px = size_px[0].max(size_px[1]);
@@ -26,8 +30,14 @@ pub(super) fn fit(
     let least = (layout_px / longer_px).min(1.0);
     for enlargement in ENLARGEMENTS {
         let layout_px = size_px.map(|side_px| side_px * least * enlargement);
-        if let Some(svg) = fit_layout(layout_px, options, &draw)? {
-            return Ok(on_page(&svg, layout_px, size_px));
+        let mut best: Option<DrawnPicture> = None;
+        for legend in [LegendPlace::Below, LegendPlace::Beside] {
+            let drawn = fit_layout(layout_px, options, &|options| draw(options, legend))?;
+            let most = best.as_ref().map_or(0.0, |best| best.px_per_m);
+            best = drawn.filter(|drawn| drawn.px_per_m > most).or(best);
+        }
+        if let Some(best) = best {
+            return Ok(on_page(&best.svg, layout_px, size_px));
         }
     }
     let value = longer_px;
@@ -42,8 +52,8 @@ pub(super) fn fit(
 fn fit_layout(
     layout_px: [f64; 2],
     options: &PictureOptions,
-    draw: &impl Fn(&PictureOptions) -> Result<String, DrawError>,
-) -> Result<Option<String>, DrawError> {
+    draw: &dyn Fn(&PictureOptions) -> Result<DrawnPicture, DrawError>,
+) -> Result<Option<DrawnPicture>, DrawError> {
     let mut room_px = layout_px;
     let size_px = Some(layout_px.map(|px| px.floor() as u32));
     for _ in 0..MAX_LAYOUTS {
@@ -51,11 +61,11 @@ fn fit_layout(
         if style.check().is_err() {
             return Ok(None);
         }
-        let svg = draw(&PictureOptions { style, size_px, ..options.clone() })?;
-        let Some(taken_px) = page_size(&svg) else { return Ok(None) };
+        let drawn = draw(&PictureOptions { style, size_px, ..options.clone() })?;
+        let Some(taken_px) = page_size(&drawn.svg) else { return Ok(None) };
         let excess_px = [0, 1].map(|k| (taken_px[k] - layout_px[k]).max(0.0));
         if excess_px == [0.0; 2] {
-            return Ok(Some(svg));
+            return Ok(Some(drawn));
         }
         room_px = [0, 1].map(|k| room_px[k] - excess_px[k]);
     }

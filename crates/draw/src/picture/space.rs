@@ -2,7 +2,7 @@
 
 use super::canvas::{Camera, Canvas, corners};
 use super::sheet::{EDGE_PX, unit};
-use super::{PictureOptions, Scene, extent, labels, map_legend, shadows};
+use super::{DrawnPicture, PictureOptions, Scene, extent, labels, map_legend, shadows};
 use crate::error::DrawError;
 use crate::legend::{Legend, paragraph, small_print_style, title_style};
 use crate::style::{FAINT_INK, GRID, Style};
@@ -15,7 +15,7 @@ use sidestep_kernel::view::Vec3;
 /// Length of an edge per number: the widest labels do not overlap.
 const NUMBER_SPACING_PX: f64 = 60.0;
 
-pub(super) fn draw(scene: &Scene<'_>, options: &PictureOptions) -> Result<String, DrawError> {
+pub(super) fn draw(scene: &Scene<'_>, options: &PictureOptions) -> Result<DrawnPicture, DrawError> {
     let style = &options.style;
     let box_m = extent::scene_bounds(scene)?;
     let mut svg = Svg::default();
@@ -37,7 +37,8 @@ pub(super) fn draw(scene: &Scene<'_>, options: &PictureOptions) -> Result<String
     let words = format!("{} {}{}", describe_box(box_m), describe_cut(scene), options.caption);
     let lines = text::wrap(&words, style.small_px(), Weight::Regular, text_width_px);
     let end = paragraph(&mut svg, &lines, (EDGE_PX, top), &small_print_style(style.small_px()));
-    Ok(svg.finish(style.width_px, end + EDGE_PX, &options.title))
+    let svg = svg.finish(style.width_px, end + EDGE_PX, &options.title);
+    Ok(DrawnPicture { svg, px_per_m: canvas.px_per_m })
 }
 
 /// Returns the canvas that shows a box as large as fits below `top`, and its height.
