@@ -118,7 +118,7 @@ pub(crate) fn draw_moment(
 pub(crate) fn draw_tracks(
     run: &mut dyn Simulation,
     folder: &Path,
-    style: &Style,
+    (style, may_grow): (&Style, bool),
 ) -> Result<(String, Vec<Trail>), Error> {
     let scenery = run.scenery();
     let frame = run.frame(FrameOptions::WITHOUT_SCANS);
@@ -127,6 +127,7 @@ pub(crate) fn draw_tracks(
     let options = PictureOptions {
         style: *style,
         title: String::new(),
+        may_grow,
         size_px: Some([style.width_px, style.height_px].map(|px| px.round() as u32)),
         ..PictureOptions::page(&scenery, "")
     };

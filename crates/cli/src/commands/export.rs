@@ -23,7 +23,6 @@ use std::path::{Path, PathBuf};
 const EXAMPLES: &str = "\
 Examples:
   sidestep export runs/office --to csv              runs/office-csv/
-  sidestep export runs/office --to parquet --table trajectories
   sidestep export runs/office --to mcap --every 10  for Foxglove
   sidestep export runs/hall --to lorr               for PlanViz of the League
   sidestep export runs/office --to rosbag           odometry and scans for ROS 2

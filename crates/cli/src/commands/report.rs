@@ -284,7 +284,10 @@ fn tracks(
         return Ok(None);
     }
     let watcher = ConsoleWatcher::new(console);
-    let tracks = track_figure(worlds(), &args.folder, &print.style.layout(), &watcher)?;
+    // A column of a paper goes on below; a slide does not.
+    let may_grow = print.style.look == FigureLook::Paper;
+    let style = print.style.layout();
+    let tracks = track_figure(worlds(), &args.folder, (&style, may_grow), &watcher)?;
     Ok(Some(print.style.finish(1, tracks.title, &tracks.svg, tracks.csv)))
 }
 

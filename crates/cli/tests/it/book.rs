@@ -4,7 +4,8 @@
 //! `cargo run --release --`. A block that no test can run is marked `sh ignore`, and its page says why.
 //!
 //! The pictures of a page are those that its commands make: `pictures/NAME.png` is `runs/NAME.png`, or the picture of
-//! the run in `runs/NAME`. `SIDESTEP_WRITE=pictures` renews them; a test of the studio makes that of its page.
+//! the run in `runs/NAME`. `SIDESTEP_WRITE=pictures` renews them. That of the studio's page needs a browser, and is
+//! none of these.
 
 use crate::support::TestFolder;
 use serde_json::Value;
@@ -72,7 +73,7 @@ fn run_all(page: &Path) -> usize {
 
 /// The folder of the pictures of all pages.
 const PICTURES: &str = "docs/src/pictures";
-/// The picture that a browser takes (`studio/tests/real/pictures.test.ts`).
+/// The picture of the studio's page, which needs a browser.
 const OF_THE_STUDIO: &str = "studio";
 /// Largest difference of a color of two pixels that look alike, of 255.
 const MAX_DIFFERENCE: u8 = 24;

@@ -64,6 +64,8 @@ pub struct PictureOptions {
     pub view: PictureView,
     /// The width and height of all of it, with its words; without them it is as large as it needs.
     pub size_px: Option<[u32; 2]>,
+    /// Whether a given height may grow, so that what is shown takes the whole width.
+    pub may_grow: bool,
 }
 
 impl PictureOptions {
@@ -76,6 +78,7 @@ impl PictureOptions {
             trails: TrailChoice::default(),
             view: PictureView::Usual,
             size_px: None,
+            may_grow: false,
         }
     }
 }
@@ -260,7 +263,7 @@ fn on_sheet(
     let box_m = extent::scene_bounds(scene)?;
     let [lo, hi] = projected_bounds(camera, box_m);
     let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
-    let px = px_per_m(scene, size_m, &options.style);
+    let px = px_per_m(scene, size_m, options);
     let caption = format!("{}{}", space::describe_cut(scene), options.caption);
     let area = SheetContent {
         origin_m: lo,
@@ -292,9 +295,12 @@ fn on_sheet(
 
 /// Returns the scale at which everything fits the style's size; whole pixels per box if boxes are
 /// large, so that walls have sharp edges.
-fn px_per_m(scene: &Scene<'_>, size_m: [f64; 2], style: &Style) -> f64 {
+fn px_per_m(scene: &Scene<'_>, size_m: [f64; 2], options: &PictureOptions) -> f64 {
+    let style = &options.style;
     let px = (style.width_px / size_m[0]).min(style.height_px / size_m[1]);
-    let Some(floor) = &scene.scenery.floor else { return px };
+    // A picture of a given size takes all of it.
+    let is_free = options.size_px.is_none();
+    let Some(floor) = scene.scenery.floor.as_ref().filter(|_| is_free) else { return px };
     let box_px = (px * floor.box_m).min(MAX_BOX_PX);
     (if box_px >= 2.0 { box_px.floor() } else { box_px }) / floor.box_m
 }

@@ -8,6 +8,8 @@ use crate::svg::{on_page, page_size};
 
 /// How much larger than the picture its layout may be, one after the other: the words of small pictures are small.
 const ENLARGEMENTS: [f64; 5] = [1.0, 1.3, 1.7, 2.2, 3.0];
+/// Largest height of a picture that may grow, as a multiple of its longer side.
+const MAX_GROWTH: f64 = 2.5;
 /// Most layouts that are tried for one size: the room that words take is known after the first, but for line breaks.
 const MAX_LAYOUTS: usize = 5;
 
@@ -30,6 +32,17 @@ pub(super) fn fit(
     let least = (layout_px / longer_px).min(1.0);
     for enlargement in ENLARGEMENTS {
         let layout_px = size_px.map(|side_px| side_px * least * enlargement);
+        if options.may_grow {
+            let tall_px = [layout_px[0], MAX_GROWTH * layout_px[0].max(layout_px[1])];
+            let below = |options: &PictureOptions| draw(options, LegendPlace::Below);
+            if let Some(drawn) = fit_layout(tall_px, options, &below)? {
+                let own_px = page_size(&drawn.svg).unwrap_or(layout_px);
+                let page_px = [layout_px[0], own_px[1].max(layout_px[1])];
+                let shown_px = page_px.map(|side_px| side_px / (least * enlargement));
+                return Ok(on_page(&drawn.svg, page_px, shown_px));
+            }
+            continue;
+        }
         let mut best: Option<DrawnPicture> = None;
         for legend in [LegendPlace::Below, LegendPlace::Beside] {
             let drawn = fit_layout(layout_px, options, &|options| draw(options, legend))?;

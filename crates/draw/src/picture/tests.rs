@@ -251,6 +251,21 @@ fn a_picture_of_some_size_has_exactly_that_and_all_of_its_words() {
     }
 }
 
+#[test]
+fn a_picture_that_may_grow_has_its_width_and_shows_more() {
+    let (scenery, frame) = two_groups();
+    let page = PictureOptions::page(&scenery, "Small print.");
+    let fixed = PictureOptions { size_px: Some([400, 260]), ..page };
+    let grown = PictureOptions { may_grow: true, ..fixed.clone() };
+    let map_px = |options: &PictureOptions| {
+        let svg = draw(&scenery, &frame, &[], options).unwrap();
+        assert!(svg.contains("width=\"400\""), "{svg}");
+        let clip = svg.split("clip_").nth(1).unwrap().split('"').next().unwrap().to_string();
+        clip.split('_').nth(2).unwrap().parse::<f64>().unwrap()
+    };
+    assert!(map_px(&grown) > 1.2 * map_px(&fixed));
+}
+
 /// Balls at the corners of a cube of 4 m, each of its own number.
 fn cube() -> (Scenery, Frame) {
     let at = |k: u32| [0, 1, 2].map(|axis| 4.0 * f64::from(k >> axis & 1));

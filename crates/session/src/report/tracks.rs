@@ -20,7 +20,8 @@ pub struct TrackFigure {
     pub csv: String,
 }
 
-/// Draws the tracks of the run in `folder` as they are at its end, as large as `style` says with all words. A run of
+/// Draws the tracks of the run in `folder` as they are at its end, as large as `style` says with all words, or higher
+/// where it may grow, as charts do. A run of
 /// this build is computed from its last checkpoint; one of another build is shown by what is recorded.
 ///
 /// # Errors
@@ -28,7 +29,7 @@ pub struct TrackFigure {
 pub fn track_figure(
     worlds: &Worlds,
     folder: &Path,
-    style: &Style,
+    style: (&Style, bool),
     watcher: &dyn Watcher,
 ) -> Result<TrackFigure, Error> {
     let recorded = RecordedRun::open(worlds, folder)?;
