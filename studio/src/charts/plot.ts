@@ -36,10 +36,35 @@ function cyclesUpTo(now: number, first: number | null, last: number | null): uPl
   return [start, Math.max(last ?? 0, now, start + 1)];
 }
 
+/**
+ * Runs a function whose canvases are drawn by the processor. Where a browser has no graphics processor, a curve of some
+ * hundred steps that is drawn by the program in its place takes longer than the view's picture of ten thousand robots.
+ */
+function withCanvasesOnProcessor<T>(create: () => T): T {
+  const { getContext } = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string) {
+    return getContext.call(this, kind, { willReadFrequently: true });
+  } as typeof getContext;
+  try {
+    return create();
+  } finally {
+    HTMLCanvasElement.prototype.getContext = getContext;
+  }
+}
+
+/**
+ * Time between two drawings of a curve whose cycles grow: each costs a software renderer as much as the view's picture, and
+ * the line of the present cycle, which is no part of the drawing, moves meanwhile.
+ */
+const GROWTH_INTERVAL_MS = 250;
+
 export class Plot {
   readonly #plot: uPlot;
   readonly #hooks: PlotHooks;
+  /** The line at the cycle that the canvas shows. */
+  readonly #line = document.createElement("div");
   #now = 0;
+  #growthTimer: ReturnType<typeof setTimeout> | null = null;
   #cursor: number | null = null;
   #isOurs = false;
 
@@ -67,10 +92,15 @@ export class Plot {
       cursor: { y: false, drag: { x: false, y: false }, points: { size: 6, fill: colors.curve } },
       hooks: {
         setCursor: [(plot) => this.#onCursorMove(plot)],
-        draw: [(plot) => this.#drawNow(plot, colors.accent)],
+        draw: [() => this.#placeLine()],
       },
     };
-    this.#plot = new uPlot(options, [[], []], host);
+    // uPlot creates its canvas itself, and takes no option for it.
+    this.#plot = withCanvasesOnProcessor(() => new uPlot(options, [[], []], host));
+    this.#line.className = "now";
+    this.#line.style.cssText = `position:absolute;left:0;top:0;width:1px;height:100%;pointer-events:none;background:${colors.accent}`;
+    this.#plot.over.append(this.#line);
+    this.#placeLine();
     this.#plot.over.addEventListener("click", () => {
       const { left } = this.#plot.cursor;
       if (left !== undefined && left >= 0) this.#hooks.onClick(Math.round(this.#plot.posToVal(left, "x")));
@@ -88,11 +118,14 @@ export class Plot {
   /** Sets the cycle that the canvas shows. */
   setNow(cycle: number): void {
     if (cycle === this.#now) return;
-    const isBeyond = cycle > (this.#plot.scales.x!.max ?? 0);
     this.#now = cycle;
+    this.#placeLine();
+    if (cycle <= (this.#plot.scales.x!.max ?? 0)) return;
     // Setting the data anew sets the range of the cycles anew.
-    if (isBeyond) this.#plot.setData(this.#plot.data);
-    else this.#plot.redraw(false);
+    this.#growthTimer ??= setTimeout(() => {
+      this.#growthTimer = null;
+      this.#plot.setData(this.#plot.data);
+    }, GROWTH_INTERVAL_MS);
   }
 
   /** Sets the cycle under the pointer of the timeline or another chart. */
@@ -106,6 +139,7 @@ export class Plot {
   }
 
   destroy(): void {
+    if (this.#growthTimer !== null) clearTimeout(this.#growthTimer);
     this.#plot.destroy();
   }
 
@@ -117,17 +151,10 @@ export class Plot {
     this.#hooks.onHover(cycle);
   }
 
-  #drawNow(plot: uPlot, color: string): void {
-    const x = plot.valToPos(this.#now, "x", true);
-    const { left, width, top, height } = plot.bbox;
-    if (!(x >= left && x <= left + width)) return;
-    plot.ctx.save();
-    plot.ctx.strokeStyle = color;
-    plot.ctx.lineWidth = devicePixelRatio;
-    plot.ctx.beginPath();
-    plot.ctx.moveTo(x, top);
-    plot.ctx.lineTo(x, top + height);
-    plot.ctx.stroke();
-    plot.ctx.restore();
+  /** Moves the line to the present cycle; at the right end until the range of the cycles has grown up to it. */
+  #placeLine(): void {
+    const width_px = this.#plot.bbox.width / devicePixelRatio;
+    const x_px = Math.min(width_px - 1, Math.max(0, this.#plot.valToPos(this.#now, "x")));
+    this.#line.style.transform = `translateX(${Number.isFinite(x_px) ? x_px : 0}px)`;
   }
 }

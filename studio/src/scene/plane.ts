@@ -4,6 +4,7 @@ import { Group } from "three";
 import type { Frame } from "../decode";
 import type { Scene, Shape } from "../protocol";
 import type { Bodies } from "../state/bodies";
+import { Dots } from "./dots";
 import { BOX, DART, DISC, Glyphs } from "./glyphs";
 import { packAppearance, tintsOf, type Palette } from "./palette";
 import type { Painter } from "./viewport";
@@ -12,9 +13,21 @@ import type { Painter } from "./viewport";
 const MIN_DART_PX = 7;
 const MIN_AGENT_PX = 1.5;
 
+/** Bodies that reach less far than this need no shape. */
+const MAX_DOT_PX = 2;
+/** Maximum ratio of the sides of a body that is drawn as a square. */
+const MAX_DOT_RATIO = 1.25;
+
 interface GlyphForm {
   half: [number, number];
   kind: number;
+}
+
+/** Returns whether a body of this form is drawn as a dot at this scale. */
+function isDot({ half, kind }: GlyphForm, pxPerM: number): boolean {
+  if (kind !== DISC && kind !== BOX) return false;
+  const long = Math.max(...half);
+  return Math.max(MIN_AGENT_PX, long * pxPerM) < MAX_DOT_PX && long <= MAX_DOT_RATIO * Math.min(...half);
 }
 
 function formOf(shape: Shape): GlyphForm {
@@ -42,16 +55,21 @@ export class PlanePainter implements Painter {
   readonly group = new Group();
   readonly #static = new Glyphs(2);
   readonly #moving = new Glyphs(3);
+  readonly #dots = new Dots(3.5, MIN_AGENT_PX);
   readonly #scene: Scene;
   #bodies: Bodies | null = null;
   #order = new Uint32Array(0);
   #lineOf = new Int32Array(0);
   #forms: GlyphForm[] = [];
+  /** For each form, whether its agents are drawn as dots at the present scale. */
+  #areDots: boolean[] = [];
+  #pxPerM = 1;
+  #frame: Frame | null = null;
   #tints: Uint32Array = new Uint32Array(0);
 
   constructor(scene: Scene) {
     this.#scene = scene;
-    this.group.add(this.#static.quads.mesh, this.#moving.quads.mesh);
+    this.group.add(this.#static.quads.mesh, this.#moving.quads.mesh, this.#dots.points);
   }
 
   paint(palette: Palette): void {
@@ -86,6 +104,8 @@ export class PlanePainter implements Painter {
     this.#order = Uint32Array.from(order, ({ index }) => index);
     this.#lineOf = Int32Array.from(order, ({ line }) => line);
     this.#forms = bodies.table.shapes.map(formOf);
+    this.#areDots = this.#forms.map((form) => isDot(form, this.#pxPerM));
+    this.#frame = null;
     this.#colors(palette);
   }
 
@@ -97,8 +117,10 @@ export class PlanePainter implements Painter {
     const bodies = this.#bodies;
     if (!bodies) return;
     const { table } = bodies;
+    this.#frame = frame;
     const glyphs = this.#moving;
     glyphs.begin(frame.bodies + frame.points_m.length / 2);
+    this.#dots.begin(this.#areDots.some(Boolean) ? frame.bodies : 0);
     for (let k = 0; k < this.#order.length; k++) {
       const i = this.#order[k]!;
       const tint = this.#tints[5 * table.appearance[i]! + frame.conditions[i]!]!;
@@ -107,6 +129,10 @@ export class PlanePainter implements Painter {
         continue;
       }
       const { half, kind } = this.#forms[table.shape[i]!]!;
+      if (this.#areDots[table.shape[i]!] && table.is_agent[i]) {
+        this.#dots.add(frame.positions_m[2 * i]!, frame.positions_m[2 * i + 1]!, half[0], tint);
+        continue;
+      }
       const minPx = !table.is_agent[i] ? 0 : kind === DART ? MIN_DART_PX : MIN_AGENT_PX;
       glyphs.add(
         frame.positions_m[2 * i]!,
@@ -120,6 +146,7 @@ export class PlanePainter implements Painter {
       );
     }
     glyphs.end();
+    this.#dots.end();
   }
 
   #rods(frame: Frame, line: number, shape: Shape, tint: number): void {
@@ -133,10 +160,19 @@ export class PlanePainter implements Painter {
   scale(pxPerM: number, palette: Palette): void {
     this.#static.scale(pxPerM, palette);
     this.#moving.scale(pxPerM, palette);
+    this.#dots.scale(pxPerM);
+    if (pxPerM === this.#pxPerM) return;
+    this.#pxPerM = pxPerM;
+    const areDots = this.#forms.map((form) => isDot(form, pxPerM));
+    const isSame = areDots.every((dot, form) => dot === this.#areDots[form]);
+    this.#areDots = areDots;
+    // Bodies that have become dots or no longer are some move from one layer to the other.
+    if (!isSame && this.#frame) this.frame(this.#frame);
   }
 
   dispose(): void {
     this.#static.quads.dispose();
     this.#moving.quads.dispose();
+    this.#dots.dispose();
   }
 }

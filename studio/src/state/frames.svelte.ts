@@ -12,6 +12,12 @@ import { Waiters } from "./waiters";
 /** Delay before credit is granted again for frames that could not be shown. */
 const CREDIT_RETRY_DELAY_MS = 1000;
 
+/**
+ * Minimum time between two changes of the texts around the view while frames follow each other: nobody reads more, and each
+ * makes the browser lay out and draw parts of the page anew, which costs as much as the view's picture.
+ */
+const TEXT_INTERVAL_MS = 100;
+
 /** What the frames of a session need from its other parts. */
 export interface FrameHooks {
   /** Returns whether the frame that has just arrived results from a seek. */
@@ -22,8 +28,10 @@ export interface FrameHooks {
 
 export class Frames {
   bodies = $state.raw<Bodies | null>(null);
-  /** Cycle, time and count of dropped frames of the shown frame. */
+  /** Cycle, time and count of dropped frames of the shown frame, for texts; up to a moment old. */
   displayed = $state.raw({ cycle: 0, time_s: 0, leftOut: 0 });
+  #newestDisplayed = this.displayed;
+  #textTimer: ReturnType<typeof setTimeout> | null = null;
   /** The newest frame. */
   newest: Frame | null = null;
   /** Whether the newest frame results from a seek and does not just follow the previous one. */
@@ -104,6 +112,23 @@ export class Frames {
   dispose(): void {
     this.cancelWaits();
     if (this.#creditTimer !== null) clearTimeout(this.#creditTimer);
+    if (this.#textTimer !== null) clearTimeout(this.#textTimer);
+  }
+
+  /** The cycle of the newest frame. */
+  get cycle(): number {
+    return this.#newestDisplayed.cycle;
+  }
+
+  /** Shows the newest numbers: at once after a seek or a pause between frames, else once the last ones could be read. */
+  #display(): void {
+    if (this.#textTimer !== null && !this.isAfterSeek) return;
+    if (this.#textTimer !== null) clearTimeout(this.#textTimer);
+    this.displayed = this.#newestDisplayed;
+    this.#textTimer = setTimeout(() => {
+      this.#textTimer = null;
+      if (this.displayed !== this.#newestDisplayed) this.#display();
+    }, TEXT_INTERVAL_MS);
   }
 
   /** A frame that cannot be shown is never drawn, so its credit must be granted again or the view would freeze. */
@@ -122,11 +147,12 @@ export class Frames {
     }
     this.newest = frame;
     this.isAfterSeek = this.#hooks.isAfterSeek();
-    this.displayed = {
+    this.#newestDisplayed = {
       cycle: frame.cycle,
       time_s: frame.time_s,
       leftOut: this.#dropped.count(frame.leftOut, this.#isWatched),
     };
+    this.#display();
     this.notify();
     this.#waiters.check();
     this.#hooks.onShown(frame);

@@ -60,14 +60,14 @@ export class Playback {
   /** Plays backwards. */
   rewind(): void {
     this.interrupt();
-    const { cycle } = this.#frames.displayed;
+    const { cycle } = this.#frames;
     const times = this.speed === "fastest" ? this.speed : this.speed.times;
     const cycles_per_s = cyclesBack_per_s(times, this.#run.scene.cycle_s, cycle);
     void this.#rewind.start(cycle, cycles_per_s, (to) => this.#seeker.seekTo(to));
   }
 
   step(cycles: number): void {
-    const from = this.#seeker.target ?? this.#pendingStep?.target ?? this.#frames.displayed.cycle;
+    const from = this.#seeker.target ?? this.#pendingStep?.target ?? this.#frames.cycle;
     // The server only steps forward; and a step during a seek counts from the seek's target.
     if (cycles < 0 || this.#seeker.target !== null) return this.seek(from + cycles);
     this.interrupt();

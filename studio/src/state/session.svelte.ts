@@ -96,7 +96,7 @@ export class Session {
   onConnectionLost(): void {
     this.client.id = 0;
     this.#cancelWaits();
-    const { cycle } = this.frames.displayed;
+    const { cycle } = this.frames;
     // Lost again while resuming: the state before the first loss is still the one to restore.
     this.#resumeState ??= { cycle, isPlaying: this.run.isPlaying, seed: this.#ownSeed };
   }
@@ -107,7 +107,7 @@ export class Session {
     const { id } = this.client;
     if (this.isFleet) {
       this.#resumeState = null;
-      return this.frames.displayed.cycle;
+      return this.frames.cycle;
     }
     if (this.run.text !== null) await this.restart(seed, this.run.text);
     if (cycle > 0) await this.playback.seekTo(cycle);
@@ -154,7 +154,7 @@ export class Session {
   refresh(withMetrics: boolean): void {
     if (this.client.ended) return;
     const { scene, status, lastCycle } = this.run;
-    const cycle = 1 + (scene.is_recording ? lastCycle : Math.max(status.cycle, this.frames.displayed.cycle));
+    const cycle = 1 + (scene.is_recording ? lastCycle : Math.max(status.cycle, this.frames.cycle));
     const ignore = (): void => undefined;
     this.events
       .fetch(cycle, (from, until, skip, limit) => this.client.request({ do: "events", from, until, skip, limit }))
@@ -173,7 +173,7 @@ export class Session {
 
   /** Jumps to the next or previous visible event. */
   jump(direction: 1 | -1): void {
-    const event = this.events.neighbor(this.frames.displayed.cycle, direction);
+    const event = this.events.neighbor(this.frames.cycle, direction);
     if (event) this.visit(event);
   }
 

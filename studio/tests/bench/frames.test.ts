@@ -28,6 +28,18 @@ interface Count {
   leftOut: number;
   scripting_ms: number;
   heap_mb: number;
+  /** CPU time of each kind of process of the browser. */
+  cpu_ms: Map<string, number>;
+}
+
+/** The browser's processes by kind, with the CPU time that each has used so far. */
+async function cpuByProcess(browser: Browser): Promise<Map<string, number>> {
+  const client = await browser.newBrowserCDPSession();
+  const { processInfo } = await client.send("SystemInfo.getProcessInfo");
+  await client.detach();
+  const sums = new Map<string, number>();
+  for (const { type, cpuTime } of processInfo) sums.set(type, (sums.get(type) ?? 0) + 1000 * cpuTime);
+  return sums;
 }
 
 async function count(page: Page, client: CDPSession): Promise<Count> {
@@ -43,6 +55,7 @@ async function count(page: Page, client: CDPSession): Promise<Count> {
     leftOut: await number("left-out"),
     scripting_ms: 1000 * of("ScriptDuration"),
     heap_mb: of("JSHeapUsedSize") / 1e6,
+    cpu_ms: await cpuByProcess(browser),
   };
 }
 
@@ -62,7 +75,15 @@ test("ten thousand robots are shown", { timeout: 4 * WAIT_MS }, async () => {
   const after = await count(page, client);
   const seconds = (performance.now() - began) / 1000;
   const perSecond = (after.pictures - before.pictures) / seconds;
-  const script = (after.scripting_ms - before.scripting_ms) / (after.pictures - before.pictures);
+  const pictures = after.pictures - before.pictures;
+  const script = (after.scripting_ms - before.scripting_ms) / pictures;
+  const cpu = [...after.cpu_ms].map(
+    ([kind, spent_ms]) => [kind, (spent_ms - (before.cpu_ms.get(kind) ?? 0)) / pictures] as const,
+  );
+  const cpu_ms = cpu.reduce((sum, [, own_ms]) => sum + own_ms, 0);
+  console.log(
+    `CPU time a frame ${cpu_ms.toFixed(1)} ms: ${cpu.map(([kind, own_ms]) => `${kind} ${own_ms.toFixed(1)}`).join(", ")}`,
+  );
   console.log(
     `${perSecond.toFixed(1)} frames/s shown, ${((after.leftOut - before.leftOut) / seconds).toFixed(1)}/s left out, ` +
       `${((after.cycles - before.cycles) / seconds).toFixed(0)} cycles/s, ${script.toFixed(1)} ms of script a frame, ` +
