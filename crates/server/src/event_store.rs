@@ -86,6 +86,16 @@ impl EventStore {
         self.frontier
     }
 
+    /// Returns all events that are kept, by their cycles.
+    pub(crate) fn kept(&self) -> &[LogEvent] {
+        &self.kept
+    }
+
+    /// Returns the number of events that were not kept.
+    pub(crate) fn lost_count(&self) -> u64 {
+        self.lost.iter().map(|(_, count)| count).sum()
+    }
+
     /// Takes the last events since the last call, and the number of those that are not among them.
     pub(crate) fn take_unsent(&mut self) -> (Vec<RunEvent>, u64) {
         let UnsentEvents { entries, left_out } = std::mem::take(&mut self.unsent);

@@ -6,8 +6,8 @@
 //! page.rs      files of the page     compress.rs  gzip                    socket.rs        one page
 //! protocol/    messages and frames   request.rs   text -> requests        outbox.rs        messages to be sent
 //! session/     one thread per run    keyframes.rs checkpoints for seeking encode/          frames as bytes
-//! metric_history.rs  metrics over time
-//! event_store.rs  events             fleet_feed.rs    views of fleets
+//! metric_history.rs  metrics over time               agent_metrics.rs  metrics of each agent
+//! event_store.rs, event_search.rs  events      fleet_feed.rs    views of fleets
 //! files.rs     readable files        write.rs     writable files          file_choices.rs  files for a text
 //! results/     reports, exports        replay_page/    recorded runs as one file that needs no server
 //! ```
@@ -16,8 +16,10 @@
 //! result, and a slow page loses frames, never the run. The program that starts the server passes in the worlds.
 
 mod access;
+mod agent_metrics;
 mod compress;
 mod encode;
+mod event_search;
 mod event_store;
 mod file_choices;
 mod files;

@@ -19,11 +19,29 @@ const MIN_RECORDED_ROWS: usize = 200;
 pub(crate) struct MetricWords {
     infos: &'static [MetricInfo],
     chart_metrics: &'static [&'static str],
+    /// The name under which metrics of agents have the agent's number, which is no metric.
+    agent_number: Option<&'static str>,
 }
 
 impl MetricWords {
     pub(crate) fn from_world(world_type: &dyn WorldType) -> Self {
-        Self { infos: world_type.metric_infos(), chart_metrics: world_type.chart_metrics() }
+        Self {
+            infos: world_type.metric_infos(),
+            chart_metrics: world_type.chart_metrics(),
+            agent_number: world_type.facts().positions.map(|positions| positions.agent),
+        }
+    }
+
+    /// Returns the words for a metric of agents; none for one that the world has no words for, such as a part of a
+    /// configuration.
+    pub(crate) fn agent_metric_name(&self, key: &str) -> Option<MetricName> {
+        if self.agent_number == Some(key) || metric_label(self.infos, key).meaning.is_empty() {
+            return None;
+        }
+        // Counters of an agent have the names of their sums, in a table of their own.
+        let own = key.rsplit_once('.').map_or(key, |(_, own)| own);
+        let is_primary = self.chart_metrics.contains(&own);
+        Some(MetricName { is_primary, ..self.metric_name(key) })
     }
 
     /// Returns the place of a metric among those that charts show first; those that they do not have the last.

@@ -148,12 +148,13 @@ export class Draft {
       if (answer.is !== "edited") return false;
       // Text typed meanwhile is kept: the edit is then repeated on it.
       if (this.text !== before) return await this.#edit(edits);
+      this.session.client.mend("edit");
       this.#push(answer.text, null, 0);
       await this.whenChecked;
       return true;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
-      this.session.client.reportProblem(error.problem);
+      this.session.client.reportUntilMended("edit", error.problem);
       return false;
     }
   }
@@ -228,6 +229,12 @@ export class Draft {
     if (read?.is === "model" && isTable(read.value)) this.model = read.value;
     this.failure = null;
     this.phase = "checked";
+    // A run that was refused for its text is refused no longer, and an edit that did not fit may fit now.
+    if (this.errors.length === 0) {
+      this.session.client.mend("restart");
+      this.session.client.mend("edit");
+      this.session.client.mend("save");
+    }
     this.#checked = text;
   }
 

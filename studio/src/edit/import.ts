@@ -26,9 +26,17 @@ export function useOf(editing: Editing, { kind, name }: FileEntry): FileUse | un
   return editing.files.find((use) => use.kind === kind && fits(use));
 }
 
-/** The numbers that a file does not say, and that the scenario does not have either. */
-export function asksOf(model: TomlTable, use: FileUse): AskedNumber[] {
-  return use.asks.filter(({ key }) => valueOf(model, key) === undefined);
+/** A number that a file does not say, with the one that the scenario has for the file before it. */
+export interface AskedValue extends AskedNumber {
+  known: number | null;
+}
+
+/** The numbers that a file does not say: asked for each time, because another file may have another scale. */
+export function asksOf(model: TomlTable, use: FileUse): AskedValue[] {
+  return use.asks.map((ask) => {
+    const known = valueOf(model, ask.key);
+    return { ...ask, known: typeof known === "number" ? known : null };
+  });
 }
 
 /**

@@ -119,7 +119,27 @@ body: BodyId, } | { "do": "metrics",
 /**
  * The number of the first row wanted.
  */
-from: number, } | { "do": "events",
+from: number, } | { "do": "agent-metrics",
+/**
+ * The name of a metric.
+ */
+metric: string | null, } | { "do": "find-events",
+/**
+ * Words that all occur in the sentence, the kind or the names of the bodies of an event, whatever their case.
+ */
+text: string,
+/**
+ * The kinds of the events wanted; all without it.
+ */
+kinds: Array<string> | null,
+/**
+ * The number of first events to leave out.
+ */
+skip: number,
+/**
+ * The largest number of events.
+ */
+limit: number, } | { "do": "events",
 /**
  * The first cycle.
  */
@@ -313,7 +333,40 @@ values: Array<Array<number | null>>,
 /**
  * The metrics of the session's present cycle; none of a recording that can only be shown.
  */
-present: MetricRow | null, } | { "is": "events",
+present: MetricRow | null, } | { "is": "agent-metrics",
+/**
+ * The metrics that can be asked for; none if one was.
+ */
+names: Array<MetricName>,
+/**
+ * The number of cycles done.
+ */
+cycle: number,
+/**
+ * The value of the requested metric for each agent, by its number; null where it has none. Empty if none was
+ * requested.
+ */
+values: Array<number | null>, } | { "is": "found-events",
+/**
+ * The events.
+ */
+entries: Array<RunEvent>,
+/**
+ * Number of events found, those that are not here included.
+ */
+found: number,
+/**
+ * Number of events that were searched.
+ */
+searched: number,
+/**
+ * Number of events that could not be searched, because they were not kept.
+ */
+left_out: number,
+/**
+ * The kinds of all events searched, with their numbers.
+ */
+kinds: Array<[string, number]>, } | { "is": "events",
 /**
  * The events.
  */
@@ -708,9 +761,34 @@ floor: OccupancyGrid | null,
  */
 bodies: Array<StaticBody>,
 /**
+ * Agents that the scenario describes together.
+ */
+groups: Array<SceneGroup>,
+/**
  * Whether a recorded run is computed again.
  */
 is_recording: boolean, };
+
+/**
+ * Agents that the scenario describes together, such as couriers.
+ */
+export type SceneGroup = {
+/**
+ * Their name.
+ */
+name: string,
+/**
+ * Their kind.
+ */
+kind: string,
+/**
+ * The number of the first of them.
+ */
+first: number,
+/**
+ * How many they are; their numbers follow each other.
+ */
+count: number, };
 
 /**
  * A floor of square boxes, along the axes of its own plane.
@@ -1052,6 +1130,10 @@ source: number,
  */
 metrics: number,
 /**
+ * The metrics of each agent, at some of the cycles; none in a world without any.
+ */
+agents: ReplayAgentMetrics | null,
+/**
  * The parts with frames, in their order.
  */
 chunks: Array<ReplayChunk>,
@@ -1071,6 +1153,27 @@ inspections: Array<ReplaySpan>,
  * What can be inspected, in words.
  */
 inspected: string, };
+
+/**
+ * The metrics of each agent over time.
+ */
+export type ReplayAgentMetrics = {
+/**
+ * The metrics.
+ */
+names: Array<MetricName>,
+/**
+ * Number of agents.
+ */
+agents: number,
+/**
+ * The number of cycles done before each row.
+ */
+cycles: Array<number>,
+/**
+ * For each metric, the part with its values, as a plane with a channel for each agent and a time for each row.
+ */
+parts: Array<number>, };
 
 /**
  * A part with frames.

@@ -93,6 +93,10 @@ export class ReplayPlayer {
         return this.#inspect(call.body);
       case "metrics":
         return this.#recording.metrics(call.from);
+      case "agent-metrics":
+        return this.#recording.agentMetrics(call.metric, this.#cycle);
+      case "find-events":
+        return this.#recording.findEvents(call);
       case "events":
         return this.#recording.events(call.from, call.until, call.skip ?? 0, call.limit);
       case "source":

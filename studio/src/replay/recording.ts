@@ -11,8 +11,11 @@ import type {
   ReplyBody,
   RunEvent,
 } from "../protocol";
+import { RequestError, makeProblem } from "../connection";
 import { decodeChunk, type FrameColumns } from "./chunk";
 import type { Parts } from "./parts";
+import { ByteReader, decodePlane } from "./plane";
+import { bodyNames, findEvents, type EventQuery } from "./search";
 
 /** Number of decoded parts that are kept: a seek within them is immediate. */
 const MAX_KEPT_PARTS = 6;
@@ -48,6 +51,7 @@ export class Recording {
   readonly count: number;
   readonly #parts: Parts;
   readonly #chunks: PartCache<FrameColumns[]>;
+  readonly #agentMetrics: PartCache<Float32Array>;
   readonly #inspections: PartCache<Map<string, ReplayInspection>>;
   /** The number of the first frame of each chunk. */
   readonly #firsts: number[] = [];
@@ -68,6 +72,10 @@ export class Recording {
     this.count = count;
     const dimensions = run.scene.dimensions === 3 ? 3 : 2;
     this.#chunks = new PartCache(async (part) => decodeChunk(await parts.bytes(part), dimensions));
+    const { agents } = run;
+    this.#agentMetrics = new PartCache(async (part) =>
+      decodePlane(new ByteReader(await parts.bytes(part)), agents?.agents ?? 0, agents?.cycles.length ?? 0),
+    );
     this.#inspections = new PartCache(async (part) => byKey(await parts.json<ReplayInspection[]>(part)));
   }
 
@@ -151,6 +159,33 @@ export class Recording {
     const rest = Math.max(0, wanted.length - skip - entries.length);
     const known_until = this.run.status.cycles_planned + 1;
     return { is: "events", entries, left_out: rest + this.run.events_left_out, known_until };
+  }
+
+  /** The reply to a search for events. */
+  async findEvents(query: EventQuery): Promise<ReplyBody> {
+    this.#events ??= this.#readEvents();
+    this.#tables ??= this.#parts.json<BodyTable[]>(this.run.tables);
+    return findEvents(await this.#events, query, bodyNames(await this.#tables), this.run.events_left_out);
+  }
+
+  /**
+   * The reply to a request for metrics of agents: the names of all, or the values of one at the last cycle up to this one
+   * that has a row.
+   */
+  async agentMetrics(metric: string | null, cycle: number): Promise<ReplyBody> {
+    const { agents } = this.run;
+    if (!agents || metric === null) return { is: "agent-metrics", names: agents?.names ?? [], cycle, values: [] };
+    const column = agents.names.findIndex(({ key }) => key === metric);
+    const part = agents.parts[column];
+    if (part === undefined) {
+      const remedy = `ask for one of ${agents.names.map(({ key }) => key).join(", ")}`;
+      throw new RequestError(makeProblem(`metric ${metric}`, "no agent of this run has it", remedy));
+    }
+    const row = Math.max(0, partitionPoint(agents.cycles, (one) => one <= cycle) - 1);
+    const all = await this.#agentMetrics.get(part);
+    const values = [...all.subarray(row * agents.agents, (row + 1) * agents.agents)];
+    const known = values.map((value) => (Number.isFinite(value) ? value : null));
+    return { is: "agent-metrics", names: [], cycle: agents.cycles[row]!, values: known };
   }
 
   /** The inspection of a body in a cycle, with its scans; null if the file has none. */

@@ -19,6 +19,8 @@ export interface Camera {
   rotate(dx_px: number, dy_px: number): void;
   /** Centers a position. */
   center(at: Point3): void;
+  /** Takes place, scale and direction of another camera of the same kind. Returns whether it is of that kind. */
+  take(other: Camera): boolean;
   /** Meters per pixel at the target point. */
   readonly mPerPx: number;
   /** The target point. */
@@ -79,6 +81,15 @@ export class PlaneCamera implements Camera {
     this.x = x;
     this.y = y;
     this.#update();
+  }
+
+  take(other: Camera): boolean {
+    if (!(other instanceof PlaneCamera)) return false;
+    this.x = other.x;
+    this.y = other.y;
+    this.mPerPx = other.mPerPx;
+    this.#update();
+    return true;
   }
 
   /** The position under a point of the canvas. */
@@ -167,6 +178,16 @@ export class SpaceCamera implements Camera {
   center(at: Point3): void {
     this.target.set(...at);
     this.#update();
+  }
+
+  take(other: Camera): boolean {
+    if (!(other instanceof SpaceCamera)) return false;
+    this.target.copy(other.target);
+    this.#distance = other.#distance;
+    this.#azimuth = other.#azimuth;
+    this.#elevation = other.#elevation;
+    this.#update();
+    return true;
   }
 
   get middle(): Point3 {

@@ -61,6 +61,9 @@ export class PlanePainter implements Painter {
   #order = new Uint32Array(0);
   #lineOf = new Int32Array(0);
   #forms: GlyphForm[] = [];
+  /** The colors of bodies that do not have their usual ones. */
+  #ownTints: Uint32Array | null = null;
+  #hidesAgents = false;
   /** For each form, whether its agents are drawn as dots at the present scale. */
   #areDots: boolean[] = [];
   #pxPerM = 1;
@@ -70,6 +73,11 @@ export class PlanePainter implements Painter {
   constructor(scene: Scene) {
     this.#scene = scene;
     this.group.add(this.#static.quads.mesh, this.#moving.quads.mesh, this.#dots.points);
+  }
+
+  setColors(tints: Uint32Array | null, hidesAgents: boolean): void {
+    this.#ownTints = tints;
+    this.#hidesAgents = hidesAgents;
   }
 
   paint(palette: Palette): void {
@@ -123,7 +131,8 @@ export class PlanePainter implements Painter {
     this.#dots.begin(this.#areDots.some(Boolean) ? frame.bodies : 0);
     for (let k = 0; k < this.#order.length; k++) {
       const i = this.#order[k]!;
-      const tint = this.#tints[5 * table.appearance[i]! + frame.conditions[i]!]!;
+      if (this.#hidesAgents && table.is_agent[i]) continue;
+      const tint = this.#ownTints?.[i] || this.#tints[5 * table.appearance[i]! + frame.conditions[i]!]!;
       if (this.#lineOf[k]! >= 0) {
         this.#rods(frame, this.#lineOf[k]!, table.shapes[table.shape[i]!]!, tint);
         continue;

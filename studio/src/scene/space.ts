@@ -75,6 +75,8 @@ export class SpacePainter implements Painter {
   readonly #scene: Scene;
   #bodies: Bodies | null = null;
   #tints: Uint32Array = new Uint32Array(0);
+  /** The colors of bodies that do not have their usual ones. */
+  #ownTints: Uint32Array | null = null;
 
   constructor(scene: Scene) {
     this.#scene = scene;
@@ -100,6 +102,10 @@ export class SpacePainter implements Painter {
     this.#tints = tintsOf(this.#bodies?.table.appearances ?? [], palette);
   }
 
+  setColors(tints: Uint32Array | null): void {
+    this.#ownTints = tints;
+  }
+
   frame(frame: Frame): void {
     const bodies = this.#bodies;
     if (!bodies) return;
@@ -109,7 +115,7 @@ export class SpacePainter implements Painter {
     let line = 0;
     for (let i = 0; i < frame.bodies; i++) {
       const shape = table.shapes[table.shape[i]!]!;
-      const tint = this.#tints[5 * table.appearance[i]! + frame.conditions[i]!]!;
+      const tint = this.#ownTints?.[i] || this.#tints[5 * table.appearance[i]! + frame.conditions[i]!]!;
       if (shape.type === "line") {
         for (let p = lineStarts[line]! + 1; p < lineStarts[line + 1]!; p++) {
           const a = points_m.subarray(3 * p - 3, 3 * p);

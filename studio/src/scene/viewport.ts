@@ -7,6 +7,8 @@ import type { Bodies } from "../state/bodies";
 import type { Link } from "../fleet/links";
 import type { TrailMode } from "../state/display.svelte";
 import { PlaneCamera, SpaceCamera, type Extent, type Camera } from "./camera";
+import { BodyColors, type ColorOptions } from "./body-colors";
+import type { ColorLegend } from "./coloring";
 import { extentOf, flatRadiusOf } from "./extent";
 import { FloorLayer } from "./floor";
 import { drawGrid } from "./grid";
@@ -25,12 +27,14 @@ export interface Painter {
   paint(palette: Palette): void;
   setBodies(bodies: Bodies, palette: Palette): void;
   frame(frame: Frame): void;
+  /** Sets colors for bodies instead of their own, none for those with 0, and whether agents are left out. */
+  setColors?(tints: Uint32Array | null, hidesAgents: boolean): void;
   scale(pxPerM: number, palette: Palette, height_px: number): void;
   dispose(): void;
 }
 
 /** Options of the page: what the viewport shows. */
-export interface ViewOptions {
+export interface ViewOptions extends ColorOptions {
   selected: BodyId | null;
   inspection: Inspection | null;
   trails: TrailMode;
@@ -75,6 +79,10 @@ export class Viewport {
   readonly camera: Camera;
   /** Called after each draw, with the roles of the visible marks. */
   onDrawn: (roles: ReadonlySet<MarkRole>) => void = () => undefined;
+  /** Called when the meaning of colors has changed; null where bodies have their own. */
+  onLegend: (legend: ColorLegend | null) => void = () => undefined;
+  /** Called after the user has moved the camera. */
+  onMoved: () => void = () => undefined;
   /** Also called after each draw: overlays follow the camera. */
   readonly drawListeners = new Set<() => void>();
   /** Number of draws so far. */
@@ -93,12 +101,17 @@ export class Viewport {
   #bodies: Bodies | null = null;
   #frame: Frame | null = null;
   #trails: Trails | null = null;
+  #colors: BodyColors | null = null;
+  #legend = "";
   #options: ViewOptions = {
     selected: null,
     inspection: null,
     trails: "none",
     widthIsTrue: false,
     follows: false,
+    colors: "own",
+    density: "auto",
+    agentValues: null,
     links: [],
   };
   #hovered: number | undefined;
@@ -123,7 +136,7 @@ export class Viewport {
     this.#isFitted = camera !== undefined && camera instanceof PlaneCamera === isPlane;
     this.camera = this.#isFitted ? camera! : isPlane ? new PlaneCamera() : new SpaceCamera();
     [this.#painter, this.#floor] = createLayers(scene);
-    if (this.#floor) this.#graph.add(this.#floor.mesh);
+    if (this.#floor) this.#graph.add(this.#floor.mesh, this.#floor.walls);
     for (const strokes of [this.#grid, this.#trailStrokes, this.#marks]) this.#graph.add(strokes.quads.mesh);
     this.#graph.add(this.#painter.group, this.#areas);
     this.#extent = extentOf(scene, null, null);
@@ -148,10 +161,10 @@ export class Viewport {
     this.#painter.dispose();
     this.#floor?.dispose();
     this.#graph.remove(this.#painter.group);
-    if (this.#floor) this.#graph.remove(this.#floor.mesh);
+    if (this.#floor) this.#graph.remove(this.#floor.mesh, this.#floor.walls);
     [this.#painter, this.#floor] = createLayers(scene);
     this.#graph.add(this.#painter.group);
-    if (this.#floor) this.#graph.add(this.#floor.mesh);
+    if (this.#floor) this.#graph.add(this.#floor.mesh, this.#floor.walls);
     if (this.#bodies) this.#painter.setBodies(this.#bodies, this.#palette);
     this.#extent = extentOf(scene, null, null);
     this.setTheme(this.#palette.isDark);
@@ -169,7 +182,11 @@ export class Viewport {
 
   setBodies(bodies: Bodies): void {
     this.#bodies = bodies;
-    this.#trails = new Trails(bodies.count, this.#scene.dimensions === 2 ? 2 : 3);
+    const dimensions = this.#scene.dimensions === 2 ? 2 : 3;
+    this.#trails = new Trails(bodies.count, dimensions);
+    this.#dropColors();
+    this.#colors = new BodyColors(bodies, this.#scene);
+    this.#graph.add(this.#colors.density.mesh);
     this.#painter.setBodies(bodies, this.#palette);
     this.#frame = null;
   }
@@ -180,6 +197,7 @@ export class Viewport {
     const isFirst = this.#frame === null;
     this.#frame = frame;
     this.#trails?.push(frame.cycle, frame.positions_m, isSought);
+    this.#colors?.push(frame, isSought);
     if (isFirst) this.#extent = extentOf(this.#scene, this.#bodies, frame);
     if (isFirst && !this.#isFitted) this.fit();
     this.#follow();
@@ -198,7 +216,10 @@ export class Viewport {
   #follow(): void {
     const { follows, selected } = this.#options;
     const index = follows && selected ? this.#bodies?.find(selected) : undefined;
-    if (index !== undefined) this.center(index);
+    const at = index === undefined ? null : this.positionOf(index);
+    if (!at) return;
+    this.camera.center(at);
+    this.#isWhole = false;
   }
 
   /** Shows everything. */
@@ -234,6 +255,15 @@ export class Viewport {
 
   /** Called when the user has moved the camera. */
   onCameraMove(): void {
+    this.#isWhole = false;
+    this.onMoved();
+    this.requestDraw();
+  }
+
+  /** Shows what another viewport of the same world shows, so that the two can be compared. */
+  takeCamera(other: Viewport): void {
+    if (other.#scene.world !== this.#scene.world || !this.camera.take(other.camera)) return;
+    this.#isFitted = true;
     this.#isWhole = false;
     this.requestDraw();
   }
@@ -296,6 +326,7 @@ export class Viewport {
     cancelAnimationFrame(this.#request);
     this.#floor?.dispose();
     this.#painter.dispose();
+    this.#dropColors();
     for (const strokes of [this.#grid, this.#trailStrokes, this.#marks]) strokes.quads.dispose();
     this.#dropAreas();
     this.#renderer.dispose();
@@ -305,7 +336,7 @@ export class Viewport {
   #draw(): void {
     this.#request = 0;
     const pxPerM = 1 / this.camera.mPerPx;
-    if (this.#bodiesChanged && this.#frame) this.#painter.frame(this.#frame);
+    if (this.#frame) this.#drawBodies(this.#frame);
     if (this.#marksChanged) this.#drawMarks();
     if (this.#viewChanged) {
       this.#painter.scale(pxPerM, this.#palette, this.#size[1]);
@@ -318,6 +349,22 @@ export class Viewport {
     this.pictures++;
     this.onDrawn(this.#roles);
     for (const listener of this.drawListeners) listener();
+  }
+
+  #drawBodies(frame: Frame): void {
+    const colors = this.#colors!;
+    const { camera } = this;
+    const size_px = this.#size;
+    const isChanged = colors.update(frame, { camera, size_px, options: this.#options, palette: this.#palette });
+    if (this.#floor) this.#floor.walls.visible = colors.isDense;
+    if (isChanged || this.#bodiesChanged) {
+      this.#painter.setColors?.(colors.tints, colors.isDense);
+      this.#painter.frame(frame);
+    }
+    const key = JSON.stringify([colors.legend, this.#palette.isDark]);
+    if (key === this.#legend) return;
+    this.#legend = key;
+    this.onLegend(colors.legend);
   }
 
   #drawMarks(): void {
@@ -346,6 +393,12 @@ export class Viewport {
     }
   }
 
+  #dropColors(): void {
+    if (!this.#colors) return;
+    this.#graph.remove(this.#colors.density.mesh);
+    this.#colors.density.dispose();
+  }
+
   #dropAreas(): void {
     for (const mesh of this.#areas.children as Mesh[]) {
       mesh.geometry.dispose();
@@ -371,7 +424,8 @@ export class Viewport {
   #drawTrail(bodies: Bodies, trails: Trails, index: number): void {
     const { table } = bodies;
     const points = trails.points(index);
-    const color = visibleColor(table.appearances[table.appearance[index]!]![0].color, this.#palette);
+    const own = table.appearances[table.appearance[index]!]![0].color;
+    const color = visibleColor(this.#colors?.colorOf(index) ?? own, this.#palette);
     const width_m = this.#options.widthIsTrue ? 2 * flatRadiusOf(table.shapes[table.shape[index]!]!) : 0;
     const maxAlpha = this.#options.widthIsTrue ? 0.35 : 0.85;
     for (let i = 1; i < points.length; i++) {

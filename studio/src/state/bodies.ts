@@ -1,7 +1,14 @@
 /** The bodies behind the columns of frames, with names and lookup. */
 
 import { bodyKey, bodyLabel } from "../format";
-import type { BodyTable, BodyId } from "../protocol";
+import type { BodyTable, BodyId, SceneGroup } from "../protocol";
+
+/** Agents that belong together: a group of the scenario, or the parts of one object. */
+export interface BodyGroup {
+  name: string;
+  /** Number of its agents. */
+  count: number;
+}
 
 export class Bodies {
   readonly table: BodyTable;
@@ -10,10 +17,14 @@ export class Bodies {
   readonly agents: Uint32Array;
   /** Indices of the bodies that are lines, in the order of a frame's lines. */
   readonly lines: Uint32Array;
+  /** The groups of agents; none where nothing distinguishes them. */
+  readonly groups: readonly BodyGroup[];
+  /** The group of each body; -1 for none. */
+  readonly groupOf: Int32Array;
   readonly #names: Map<number, string>;
   readonly #indexByKey = new Map<string, number>();
 
-  constructor(table: BodyTable) {
+  constructor(table: BodyTable, groups: readonly SceneGroup[] = []) {
     this.table = table;
     this.count = table.kind.length;
     this.#names = new Map(table.names);
@@ -26,6 +37,42 @@ export class Bodies {
     }
     this.agents = Uint32Array.from(agents);
     this.lines = Uint32Array.from(lines);
+    this.groupOf = new Int32Array(this.count).fill(-1);
+    this.groups = groups.length > 0 ? this.#fillGroups(groups) : this.#fillObjects();
+  }
+
+  /** Puts agents into the groups of the scenario. */
+  #fillGroups(groups: readonly SceneGroup[]): BodyGroup[] {
+    const { kinds, kind, number } = this.table;
+    const counts = groups.map(() => 0);
+    for (const i of this.agents) {
+      const at = groups.findIndex(
+        (group) =>
+          group.kind === kinds[kind[i]!] && number[i]! >= group.first && number[i]! < group.first + group.count,
+      );
+      this.groupOf[i] = at;
+      if (at >= 0) counts[at]!++;
+    }
+    return groups.map(({ name }, at) => ({ name, count: counts[at]! }));
+  }
+
+  /** Where agents are parts of objects, each object is a group; its other bodies, such as rods, belong to it. */
+  #fillObjects(): BodyGroup[] {
+    const { number, part } = this.table;
+    const groups: BodyGroup[] = [];
+    const byNumber = new Map<number, number>();
+    for (const i of this.agents) {
+      if (part[i]! < 0) return [];
+      let at = byNumber.get(number[i]!);
+      if (at === undefined) {
+        at = groups.length;
+        byNumber.set(number[i]!, at);
+        groups.push({ name: this.#names.get(i) ?? `object ${number[i]}`, count: 0 });
+      }
+      groups[at]!.count++;
+    }
+    for (let i = 0; i < this.count; i++) this.groupOf[i] = byNumber.get(number[i]!) ?? -1;
+    return groups;
   }
 
   bodyId(index: number): BodyId {

@@ -1,5 +1,7 @@
 /** The page's display settings of one session. */
 
+import type { ColorMode, DensityMode } from "./color-mode";
+
 export type TrailMode = "none" | "selected" | "all";
 
 export class Display {
@@ -8,6 +10,9 @@ export class Display {
   widthIsTrue = $state(false);
   /** Whether the view follows the selected body. */
   follows = $state(false);
+  /** What the colors of bodies stand for. */
+  colors = $state<ColorMode>("own");
+  density = $state<DensityMode>("auto");
   /** Cycle under the pointer in the timeline or a chart. */
   cursor = $state<number | null>(null);
 }

@@ -25,6 +25,8 @@ export class Events {
   /** Kinds that lists, timeline and jumps leave out. */
   hiddenKinds = $state.raw<ReadonlySet<string>>(new Set());
   leftOut = $state(0);
+  /** Number of events that were fetched, of which the list keeps the newest. */
+  fetched = $state(0);
   /** All events before this cycle were fetched. */
   #fetchedUntil = 0;
   #isFetching = false;
@@ -34,6 +36,7 @@ export class Events {
     this.list = [];
     this.kinds = new Map();
     this.leftOut = 0;
+    this.fetched = 0;
     this.#fetchedUntil = 0;
     this.#age++;
     this.#isFetching = false;
@@ -94,11 +97,17 @@ export class Events {
       return left <= 0;
     });
     if (fresh.length === 0) return;
+    this.fetched += fresh.length;
     const all = [...this.list, ...fresh].sort((a, b) => a.cycle - b.cycle);
     this.list = all.slice(-MAX_EVENTS);
     const kinds = new Map<string, number>();
     for (const event of this.list) kinds.set(event.kind, (kinds.get(event.kind) ?? 0) + 1);
     this.kinds = kinds;
+  }
+
+  /** Number of all events so far, those that no list has included. */
+  get total(): number {
+    return this.fetched + this.leftOut;
   }
 
   /** The events of kinds that are not hidden. */

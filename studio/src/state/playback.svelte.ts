@@ -164,7 +164,8 @@ export class Playback {
       await this.#client.request({ do: "seek", cycle });
       return true;
     } catch (error) {
-      if (command === this.#commands) this.#client.reportError(error);
+      // The server refuses a seek that a newer one has replaced.
+      if (command === this.#commands && this.#seeker.isCurrent(cycle)) this.#client.reportError(error);
       return false;
     }
   }

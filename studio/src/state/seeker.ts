@@ -1,10 +1,19 @@
-/** Seeks to requested cycles: one at a time; of further requests only the latest is kept. */
+/**
+ * Seeks to requested cycles. A seek that lasts gives way to a newer request; of requests that come sooner only the latest
+ * is kept, so that pictures come while somebody scrubs.
+ */
+
+/** Time after which a seek in progress is replaced by a newer one. */
+export const REPLACED_AFTER_MS = 250;
 
 export class Seeker {
   #requested: number | null = null;
   #current: number | null = null;
   #seeking: Promise<boolean> | null = null;
   #isAfterSeek = false;
+  #startedAt_ms = 0;
+  /** Goes on with the newest request without the reply to the one in progress. */
+  #replace: () => void = () => undefined;
   readonly #seek: (cycle: number) => Promise<boolean>;
 
   /** `seek` asks the server, and returns whether it reached the cycle. */
@@ -17,11 +26,18 @@ export class Seeker {
     return this.#seeking === null ? null : (this.#requested ?? this.#current);
   }
 
-  /** Seeks to a cycle, after the seek in progress. Returns whether the last requested cycle was reached. */
+  /** Returns whether the seek to a cycle is the one in progress, which no newer one has replaced. */
+  isCurrent(cycle: number): boolean {
+    return this.#current === cycle;
+  }
+
+  /** Seeks to a cycle, instead of the seek in progress. Returns whether the last requested cycle was reached. */
   seekTo(cycle: number): Promise<boolean> {
     this.#requested = cycle;
     this.#isAfterSeek = true;
-    this.#seeking ??= this.#run();
+    if (this.#seeking === null) return (this.#seeking = this.#run());
+    const replace = this.#replace;
+    setTimeout(replace, Math.max(0, this.#startedAt_ms + REPLACED_AFTER_MS - performance.now()));
     return this.#seeking;
   }
 
@@ -44,8 +60,11 @@ export class Seeker {
       const cycle = this.#requested;
       this.#requested = null;
       this.#current = cycle;
-      isReached = await this.#seek(cycle);
+      this.#startedAt_ms = performance.now();
+      const replaced = new Promise<boolean>((then) => (this.#replace = () => then(false)));
+      isReached = await Promise.race([this.#seek(cycle), replaced]);
     }
+    this.#current = null;
     this.#seeking = null;
     return isReached;
   }

@@ -8,6 +8,8 @@ export interface SessionHost {
   request(call: ServerMethod): Promise<ReplyBody>;
   requestSession(session: number, call: SessionMethod): Promise<ReplyBody>;
   onProblem(problem: Problem): void;
+  /** A problem that was reported no longer holds, because what it was about has succeeded. */
+  onMended?(problem: Problem): void;
   /** Whether the page is a replay in one file: it has no server, and runs are only shown. */
   readonly isReplay?: boolean;
 }
@@ -20,6 +22,8 @@ export class SessionClient {
   /** The problem that ended the session on the server. */
   ended = $state.raw<Problem | null>(null);
   readonly #host: SessionHost;
+  /** The last problem of each method, until a request of it succeeds. */
+  readonly #unmended = new Map<string, Problem>();
 
   constructor(host: SessionHost) {
     this.#host = host;
@@ -44,11 +48,27 @@ export class SessionClient {
   /** Sends a request and reports its problem, if there is one. */
   async send(call: SessionMethod): Promise<ReplyBody | null> {
     try {
-      return await this.request(call);
+      const answer = await this.request(call);
+      this.mend(call.do);
+      return answer;
     } catch (error) {
+      if (error instanceof RequestError) this.#unmended.set(call.do, error.problem);
       this.reportError(error);
       return null;
     }
+  }
+
+  /** Reports the problem of a method, until a request of it succeeds. */
+  reportUntilMended(method: SessionMethod["do"], problem: Problem): void {
+    this.#unmended.set(method, problem);
+    this.reportProblem(problem);
+  }
+
+  /** A request of a method has succeeded: its last problem is shown no longer. */
+  mend(method: SessionMethod["do"]): void {
+    const problem = this.#unmended.get(method);
+    this.#unmended.delete(method);
+    if (problem) this.#host.onMended?.(problem);
   }
 
   /** Sends a request whose failure is ignored. */

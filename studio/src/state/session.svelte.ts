@@ -6,7 +6,10 @@
 import { linksBetweenBodies, type Link } from "../fleet/links";
 import { initialSpeed } from "../format";
 import type { BodyTable, OpenTarget, Problem, ReplyBody, RunEvent, SessionStatus } from "../protocol";
+import { AgentMetrics } from "./agent-metrics.svelte";
+import { metricOf } from "./color-mode";
 import { Display } from "./display.svelte";
+import { EventSearch } from "./event-search.svelte";
 import { Events } from "./events.svelte";
 import { Frames } from "./frames.svelte";
 import { Metrics } from "./metrics.svelte";
@@ -29,7 +32,9 @@ export class Session {
   readonly playback: Playback;
   readonly selection: Selection;
   readonly events = new Events();
+  readonly eventSearch = new EventSearch();
   readonly metrics = new Metrics();
+  readonly agentMetrics = new AgentMetrics();
   readonly display = new Display();
   /** The state when the connection was lost, until it is restored. */
   #resumeState: { cycle: number; isPlaying: boolean; seed: number | null } | null = null;
@@ -132,7 +137,7 @@ export class Session {
   }
 
   onBodyTable(table: BodyTable): void {
-    this.frames.onBodyTable(table);
+    this.frames.onBodyTable(table, this.run.scene.groups);
   }
 
   onFrame(bytes: ArrayBuffer): void {
@@ -159,8 +164,25 @@ export class Session {
     this.events
       .fetch(cycle, (from, until, skip, limit) => this.client.request({ do: "events", from, until, skip, limit }))
       .catch(ignore);
+    this.eventSearch.refresh(this.events.total, this.findEvents).catch(ignore);
+    const askAgents = (metric: string | null): Promise<ReplyBody> =>
+      this.client.request({ do: "agent-metrics", metric });
+    this.agentMetrics.fetchNames(askAgents).catch(ignore);
+    const colorMetric = metricOf(this.display.colors);
+    if (colorMetric !== null) this.agentMetrics.fetchValues(colorMetric, this.frames.cycle, askAgents).catch(ignore);
     if (withMetrics && !this.isFleet)
       this.metrics.fetch((from) => this.client.request({ do: "metrics", from })).catch(ignore);
+  }
+
+  /** Asks the server for the events with some words. */
+  readonly findEvents = (text: string, kinds: string[] | null, skip: number, limit: number): Promise<ReplyBody> =>
+    this.client.request({ do: "find-events", text, kinds, skip, limit });
+
+  /** Searches all events for a text, among the kinds that are not hidden. */
+  searchEvents(text: string): void {
+    const { kinds, hiddenKinds } = this.events;
+    const shown = hiddenKinds.size === 0 ? null : [...kinds.keys()].filter((kind) => !hiddenKinds.has(kind));
+    this.eventSearch.type(text, shown, this.findEvents);
   }
 
   /** Seeks to an event, and selects its agent. */
@@ -191,7 +213,9 @@ export class Session {
     this.client.ended = null;
     this.run.onStart(scene, status);
     this.events.clear();
+    this.eventSearch.clear();
     this.metrics.clear();
+    this.agentMetrics.clear();
     this.selection.onStart();
     this.frames.onStart();
     this.playback.onStart();

@@ -120,6 +120,10 @@ export class Studio {
     this.problems = [...this.problems.slice(-3), { key: ++this.#problemKeys, problem }];
   }
 
+  #onMended({ place, cause }: Problem): void {
+    this.problems = this.problems.filter(({ problem }) => problem.place !== place || problem.cause !== cause);
+  }
+
   dismiss(key: number): void {
     this.problems = this.problems.filter((one) => one.key !== key);
   }
@@ -136,6 +140,7 @@ export class Studio {
       request: this.request,
       requestSession: this.#requestSession,
       onProblem: (problem) => this.onProblem(problem),
+      onMended: (problem) => this.#onMended(problem),
       isReplay: this.isReplay,
     });
     if (!(await this.#openAt(session, seed))) return false;
@@ -201,11 +206,11 @@ export class Studio {
     this.comparison.stop();
   }
 
-  /** The two runs to compare: of synchronized sessions, the active one and the first other. */
+  /** The two runs to compare: of sessions side by side or in step, the active one and the first other. */
   get pair(): [Session, Session] | null {
     const active = this.active;
     const other = this.sessions.find((one) => one !== active);
-    if (!this.inStep || !active || !other || active.isFleet || other.isFleet) return null;
+    if (!(this.inStep || this.sideBySide) || !active || !other || active.isFleet || other.isFleet) return null;
     return this.sessions.indexOf(other) < this.sessions.indexOf(active) ? [other, active] : [active, other];
   }
 

@@ -33,7 +33,7 @@ for (const world of ["robots", "chain", "airspace"]) {
           () => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 12,
         );
         await page.getByRole("button", { name: "Pause" }).click();
-        await page.locator(".agents").getByRole("option").nth(3).click();
+        await page.locator(".agents .row:not(.group)").nth(3).click();
         if (width === 400) await page.getByRole("tab", { name: "inspector" }).click();
         await page.locator("details").first().waitFor();
         await drawn(page);

@@ -101,6 +101,10 @@ export function robots(count: number): FakeWorld {
           appearance: { color: [60, 60, 60], opacity: 1, layer: 1 },
         },
       ],
+      groups: [
+        { name: "couriers", kind: "robot", first: 0, count: Math.ceil(count / 3) },
+        { name: "guards", kind: "robot", first: Math.ceil(count / 3), count: count - Math.ceil(count / 3) },
+      ],
     },
     table: {
       kinds: ["robot"],
@@ -275,6 +279,7 @@ export function chain(): FakeWorld {
       dimensions: 3,
       cycle_s: 0.02,
       is_recording: false,
+      groups: [],
       floor: null,
       bodies: Array.from({ length: 80 }, (_, i) => ball(i)),
     },
@@ -367,6 +372,7 @@ export function airplanes(): FakeWorld {
       dimensions: 2,
       cycle_s: 5,
       is_recording: false,
+      groups: [],
       floor: null,
       bodies: Array.from({ length: n }, (_, i) => {
         const [x, y] = at((i + n / 2) % n, 0);

@@ -17,6 +17,7 @@ import type {
   OpenTarget,
   SweepRun,
 } from "../../src/protocol";
+import { bodyNames, findEvents } from "../../src/replay/search";
 import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
 import { declaredEditing } from "./editing";
 import { encodeFrame } from "./encode";
@@ -485,6 +486,12 @@ function act(call: Exclude<SessionMethod, { do: "save" }>, run: Run): ReplyBody 
       return { is: "inspection", ...run.world.inspect(call.body, run.cycle) };
     case "metrics":
       return metrics(run, call.from);
+    case "agent-metrics":
+      return agentMetrics(run, call.metric);
+    case "find-events": {
+      const all = run.world.events(0, run.cycle);
+      return findEvents(all, call, bodyNames([{ ...run.world.table, session: 1, id: 1 }]), 0);
+    }
     case "events": {
       const all = run.world.events(call.from, call.until).slice(call.skip ?? 0);
       return {
@@ -523,6 +530,24 @@ function model(text: string): ReplyBody {
   } catch (error) {
     throw problemOf(String(error), "write TOML");
   }
+}
+
+/** Trips of each agent, every tenth of which has had none and has no mean. */
+function agentMetrics(run: Run, metric: string | null): ReplyBody {
+  const { number, is_agent } = run.world.table;
+  const agents = number.filter((_, i) => is_agent[i]);
+  const names = [
+    { key: "trips", label: "trips completed", unit: "", is_primary: true },
+    { key: "trip_cycles_mean", label: "mean length of a trip", unit: "cycles", is_primary: false },
+  ];
+  const known = names.find(({ key }) => key === metric);
+  if (metric !== null && !known) throw problemOf("no agent of this run has it", "ask for trips");
+  const valueOf = (agent: number): number | null => {
+    if (known?.key === "trips") return Math.floor(run.cycle / 10) * (agent % 10);
+    return agent % 10 === 0 ? null : 20 + agent;
+  };
+  const values = metric === null ? [] : agents.map(valueOf);
+  return { is: "agent-metrics", names: metric === null ? names : [], cycle: run.cycle, values };
 }
 
 function metrics(run: Run, from: number): ReplyBody {

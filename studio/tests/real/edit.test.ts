@@ -132,13 +132,13 @@ describe.skipIf(BINARY === "")("the real program", () => {
     await edit();
     await hand.tool("Robot");
     await hand.click(4.25, 0.75);
-    await page.locator(".agents").getByRole("option").nth(1).waitFor();
+    await page.locator(".agents .row:not(.group)").nth(1).waitFor();
     await hand.tool("Select");
     await hand.drag([0.75, 1.25], [1.75, 1.75]);
     await checked();
     expect(await saved()).toContain("at = [[3, 3, 0], [8, 1]]                 # looks east");
     await page.getByRole("button", { name: "Edit", exact: true }).click();
-    await page.locator(".agents").getByRole("option").nth(1).click();
+    await page.locator(".agents .row:not(.group)").nth(1).click();
     await page.getByText(/4\.25/).first().waitFor();
   });
 

@@ -53,7 +53,7 @@ describe.skipIf(BINARY === "")("the real program", () => {
           () => Number(document.querySelector("[data-testid=cycle]")?.textContent?.replace(/\D/g, "")) >= 20,
         );
         await page.getByRole("button", { name: "Pause" }).click();
-        await page.locator(".agents").getByRole("option").nth(2).click();
+        await page.locator(".agents .row:not(.group)").nth(2).click();
         if (width === 400) await page.getByRole("tab", { name: "inspector" }).click();
         await page.locator(".inspector details, .inspector .problem").first().waitFor();
         if (width === 1280) await page.locator(".chart .value").filter({ hasText: /\d/ }).first().waitFor();

@@ -59,11 +59,11 @@ test("a map replaces the previous one, and a profile is added to others", () => 
   expect(editsFor({ profiles: ["p.toml"] }, "robots", entry("profile", "p.toml"))).toEqual([]);
 });
 
-test("the side of an image's pixels is asked for, unless the scenario has it", () => {
+test("the side of an image's pixels is asked for each time, with the one that the scenario has", () => {
   const use = useOf(declaredEditing("robots"), entry("map", "a.png"))!;
   const asked = asksOf({}, use);
-  expect(asked).toEqual([{ key: "map.resolution_m", name: "Side of a pixel", unit: "m" }]);
-  expect(asksOf({ map: { resolution_m: 0.1 } }, use)).toEqual([]);
+  expect(asked).toEqual([{ key: "map.resolution_m", name: "Side of a pixel", unit: "m", known: null }]);
+  expect(asksOf({ map: { resolution_m: 0.1 } }, use)).toMatchObject([{ key: "map.resolution_m", known: 0.1 }]);
   expect(asksOf({}, useOf(declaredEditing("robots"), entry("map", "a.yaml"))!)).toEqual([]);
   const answers = new Map([["map.resolution_m", 0.02]]);
   expect(importEdits({}, use, "a.png", answers).at(-1)).toEqual({ op: "set", key: "map.resolution_m", value: 0.02 });

@@ -155,6 +155,7 @@ function replayText(): string {
           cycle_s: 0.1,
           floor: null,
           bodies: [],
+          groups: [],
           is_recording: true,
         },
         status,
@@ -164,6 +165,12 @@ function replayText(): string {
         tables: 1,
         source: 2,
         metrics: 3,
+        agents: {
+          names: [{ key: "trips", label: "trips", unit: "", is_primary: true }],
+          agents: 4,
+          cycles: [0, 20, 30],
+          parts: [7],
+        },
         chunks: [{ part: 4, frames: 4 }],
         events: [{ part: 5, from: 3, until: 23, count: 3 }],
         events_left_out: 4,
@@ -173,9 +180,20 @@ function replayText(): string {
     ],
   };
   const source = { is: "source", place: "scenario.toml", text: "a = 1", read_only: true };
-  const parts = [file, [table], source, metrics, chunk(4), events, inspections];
+  const parts = [file, [table], source, metrics, chunk(4), events, inspections, agentPlane()];
   const packed = parts.map((part) => (part instanceof Uint8Array ? part : Buffer.from(JSON.stringify(part))));
   return packed.map((part) => deflateRawSync(part).toString("base64")).join("\n");
+}
+
+/** The trips of four agents at three times, of which the first has none at the start. */
+function agentPlane(): Uint8Array {
+  const trips = [
+    [NaN, 1, 2],
+    [0, 3, 4],
+    [0, 5, 6],
+    [0, 7, 8],
+  ];
+  return new Uint8Array([0, ...new Uint8Array(Float32Array.from(trips.flat()).buffer)]);
 }
 
 async function opened(): Promise<Studio> {
@@ -271,4 +289,27 @@ test("links hold a cycle and an agent", () => {
   expect(formatLink({ cycle: 5, agent: "chain/0/17" })).toBe("cycle=5&agent=chain/0/17");
   expect(formatLink({ cycle: null, agent: "a&b" })).toBe("agent=a%26b");
   expect(parseLink("")).toEqual({ cycle: null, agent: null });
+});
+
+test("metrics of agents are those of the last cycle that has a row, and unknown ones are told the known", async () => {
+  const studio = await opened();
+  const { client } = studio.active!;
+  const ask = async (metric: string | null): Promise<unknown> => client.request({ do: "agent-metrics", metric });
+  expect(await ask(null)).toMatchObject({ names: [{ key: "trips" }], values: [] });
+  expect(await ask("trips")).toMatchObject({ cycle: 0, values: [null, 0, 0, 0] });
+  await studio.active!.playback.seekTo(20);
+  expect(await ask("trips")).toMatchObject({ cycle: 20, values: [1, 3, 5, 7] });
+  await expect(ask("tripps")).rejects.toMatchObject({ problem: { remedy: "ask for one of trips" } });
+});
+
+test("a search goes over the events of the whole file, by words and kinds, page by page", async () => {
+  const studio = await opened();
+  const { client } = studio.active!;
+  const find = async (text: string, kinds: string[] | null, skip = 0): Promise<unknown> =>
+    client.request({ do: "find-events", text, kinds, skip, limit: 2 });
+  const all = { searched: 3, left_out: 4, kinds: [["contact", 3]] };
+  expect(await find("touched", null)).toMatchObject({ ...all, found: 3, entries: [{ cycle: 3 }, { cycle: 3 }] });
+  expect(await find("touched", null, 2)).toMatchObject({ ...all, found: 3, entries: [{ cycle: 23 }] });
+  expect(await find("ROBOT 3", ["contact"])).toMatchObject({ found: 1, entries: [{ cycle: 3, body: { number: 3 } }] });
+  expect(await find("touched", [])).toMatchObject({ found: 0, entries: [] });
 });

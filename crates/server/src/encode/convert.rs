@@ -1,10 +1,13 @@
 //! Views of the kernel as types of the protocol.
 
 use crate::protocol::{
-    Appearance, BodyId, OccupancyGrid, Problem, RunEvent, Scan, Scene, Shape, StaticBody,
+    Appearance, BodyId, OccupancyGrid, Problem, RunEvent, Scan, Scene, SceneGroup, Shape,
+    StaticBody,
 };
 use sidestep_kernel::InputError;
-use sidestep_kernel::view::{self, Body, Kinds, LogEvent, Occupancy, Scenery, Severity};
+use sidestep_kernel::view::{
+    self, AgentGroup, Body, Kinds, LogEvent, Occupancy, Scenery, Severity,
+};
 
 /// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
 pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: bool) -> Scene {
@@ -16,7 +19,17 @@ pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: b
         cycle_s: scenery.cycle_s,
         floor: scenery.floor.as_ref().map(occupancy_grid),
         bodies: scenery.bodies.iter().map(|body| static_body(body, scenery)).collect(),
+        groups: scenery.groups.iter().map(group).collect(),
         is_recording,
+    }
+}
+
+fn group(group: &AgentGroup) -> SceneGroup {
+    SceneGroup {
+        name: group.name.clone(),
+        kind: group.kind.name().into(),
+        first: group.numbers.start,
+        count: group.numbers.len() as u32,
     }
 }
 

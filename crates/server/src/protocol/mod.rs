@@ -38,7 +38,10 @@ mod typescript;
 
 pub use edit::Edit;
 pub use fleet::{Fleet, FleetNode};
-pub use replay::{ReplayChunk, ReplayEvents, ReplayFile, ReplayInspection, ReplayRun, ReplaySpan};
+pub use replay::{
+    ReplayAgentMetrics, ReplayChunk, ReplayEvents, ReplayFile, ReplayInspection, ReplayRun,
+    ReplaySpan,
+};
 pub use reply::{
     FileEntry, FileKind, MetricName, MetricRow, Problem, Reply, ReplyBody, ReplyResult,
     ServerNotification, SessionState, SessionStatus, SweepRun, TargetRef,
@@ -47,7 +50,8 @@ pub use request::{
     BodyId, ClientRequest, OpenTarget, RunMethod, ServerMethod, SessionMethod, Speed,
 };
 pub use scene::{
-    Appearance, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, Shape, StaticBody,
+    Appearance, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, SceneGroup, Shape,
+    StaticBody,
 };
 
 /// Version of requests, replies, notifications and frames together.

@@ -41,6 +41,8 @@ pub struct ReplayRun {
     pub source: u32,
     /// The part with the reply to the request for all rows of metrics.
     pub metrics: u32,
+    /// The metrics of each agent, at some of the cycles; none in a world without any.
+    pub agents: Option<ReplayAgentMetrics>,
     /// The parts with frames, in their order.
     pub chunks: Vec<ReplayChunk>,
     /// The parts with events, in their order.
@@ -51,6 +53,20 @@ pub struct ReplayRun {
     pub inspections: Vec<ReplaySpan>,
     /// What can be inspected, in words.
     pub inspected: String,
+}
+
+/// The metrics of each agent over time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct ReplayAgentMetrics {
+    /// The metrics.
+    pub names: Vec<super::MetricName>,
+    /// Number of agents.
+    pub agents: u32,
+    /// The number of cycles done before each row.
+    pub cycles: Vec<f64>,
+    /// For each metric, the part with its values, as a plane with a channel for each agent and a time for each row.
+    pub parts: Vec<u32>,
 }
 
 /// A part with frames.

@@ -71,6 +71,29 @@ pub enum ReplyBody {
         /// The metrics of the session's present cycle; none of a recording that can only be shown.
         present: Option<MetricRow>,
     },
+    /// The metrics of each agent at one cycle.
+    AgentMetrics {
+        /// The metrics that can be asked for; none if one was.
+        names: Vec<MetricName>,
+        /// The number of cycles done.
+        cycle: f64,
+        /// The value of the requested metric for each agent, by its number; null where it has none. Empty if none was
+        /// requested.
+        values: Vec<Option<f64>>,
+    },
+    /// The events that a search has found, the oldest first.
+    FoundEvents {
+        /// The events.
+        entries: Vec<RunEvent>,
+        /// Number of events found, those that are not here included.
+        found: u64,
+        /// Number of events that were searched.
+        searched: u64,
+        /// Number of events that could not be searched, because they were not kept.
+        left_out: u64,
+        /// The kinds of all events searched, with their numbers.
+        kinds: Vec<(String, u64)>,
+    },
     /// Events, the oldest first.
     Events {
         /// The events.

@@ -156,6 +156,23 @@ pub enum RunMethod {
         /// The number of the first row wanted.
         from: u32,
     },
+    /// Asks for the metrics of each agent at the present cycle: without a name for their names, with one for its values.
+    /// They are computed for this request alone.
+    AgentMetrics {
+        /// The name of a metric.
+        metric: Option<String>,
+    },
+    /// Searches all events so far, the oldest first: at most `limit`, after the first `skip` ones.
+    FindEvents {
+        /// Words that all occur in the sentence, the kind or the names of the bodies of an event, whatever their case.
+        text: String,
+        /// The kinds of the events wanted; all without it.
+        kinds: Option<Vec<String>>,
+        /// The number of first events to leave out.
+        skip: u32,
+        /// The largest number of events.
+        limit: u32,
+    },
     /// Asks for the events so far between two cycles (`from` included, `until` excluded), at most `limit`, after the
     /// first `skip` ones.
     Events {
@@ -188,7 +205,7 @@ pub enum RunMethod {
 
 impl RunMethod {
     /// The names of all methods.
-    pub const NAMES: [&str; 13] = [
+    pub const NAMES: [&str; 15] = [
         "play",
         "pause",
         "step",
@@ -198,6 +215,8 @@ impl RunMethod {
         "credit",
         "inspect",
         "metrics",
+        "agent-metrics",
+        "find-events",
         "events",
         "source",
         "tables",

@@ -21,8 +21,24 @@ pub struct Scene {
     pub floor: Option<OccupancyGrid>,
     /// Walls, obstacles at rest, starts and goals.
     pub bodies: Vec<StaticBody>,
+    /// Agents that the scenario describes together.
+    pub groups: Vec<SceneGroup>,
     /// Whether a recorded run is computed again.
     pub is_recording: bool,
+}
+
+/// Agents that the scenario describes together, such as couriers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct SceneGroup {
+    /// Their name.
+    pub name: String,
+    /// Their kind.
+    pub kind: String,
+    /// The number of the first of them.
+    pub first: u32,
+    /// How many they are; their numbers follow each other.
+    pub count: u32,
 }
 
 /// A floor of square boxes, along the axes of its own plane.

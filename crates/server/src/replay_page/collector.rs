@@ -1,5 +1,6 @@
 //! Collects all that a replay shows of a run, while the run is computed again.
 
+use super::agent_rows::AgentRows;
 use super::agents::InspectionRequest;
 use super::chunk::ChunkBuilder;
 use super::extent::finest_step_exponent;
@@ -36,6 +37,7 @@ pub(super) struct ReplayCollector<'a> {
     tables: Vec<BodyTable>,
     log: EventStore,
     metrics: MetricHistory,
+    agents: AgentRows,
     inspections: InspectionParts,
     /// Digests of the states of all frames, if they are kept.
     digests: Vec<u8>,
@@ -64,6 +66,7 @@ impl<'a> ReplayCollector<'a> {
     pub(super) fn new(
         run: &mut dyn Simulation,
         metrics: MetricHistory,
+        agents: AgentRows,
         options: &'a ReplayOptions<'a>,
         parts: &'a mut Parts,
     ) -> Self {
@@ -80,6 +83,7 @@ impl<'a> ReplayCollector<'a> {
             tables: Vec::new(),
             log: EventStore::default(),
             metrics,
+            agents,
             inspections: InspectionParts::default(),
             digests: Vec::new(),
         }
@@ -119,6 +123,7 @@ impl<'a> ReplayCollector<'a> {
             tables: self.parts.push_json(&self.tables)?,
             source: self.parts.push_json(&source)?,
             metrics: self.parts.push_json(&self.metrics.metrics_reply(run, 0))?,
+            agents: self.agents.finish(run, self.parts)?,
             chunks: std::mem::take(&mut self.chunks),
             events,
             events_left_out,
@@ -233,6 +238,7 @@ impl FrameSink for ReplayCollector<'_> {
             self.digests.extend(run.digest().as_bytes());
         }
         self.metrics.add(&run.take_series());
+        self.agents.add_frame(run);
         self.push_inspections(run, &frame)
     }
 }

@@ -4,10 +4,12 @@
 //! ```text
 //! collector.rs  frames, events, metrics, inspections     chunk.rs, plane.rs  frames as few bytes
 //! agents.rs     which agents are inspected               extent.rs           how exact places have to be
+//! agent_rows.rs metrics of each agent over time
 //! parts.rs      deflated and as base64                   html.rs, start.js   the document
 //! ```
 //! The other side is `studio/src/replay/`: a socket without a server, which answers the page's requests from the parts.
 
+mod agent_rows;
 mod agents;
 mod chunk;
 mod collector;
@@ -23,6 +25,7 @@ pub use agents::InspectionRequest;
 use crate::metric_history::{MetricHistory, MetricWords};
 use crate::page;
 use crate::protocol::{ReplayFile, ReplayRun, VERSION};
+use agent_rows::AgentRows;
 use collector::{ReplayCollector, ReplayOptions, ReplayOrigin};
 use parts::Parts;
 use sidestep_kernel::text::group_thousands;
@@ -162,7 +165,8 @@ fn collect_run(
     // A recording that can only be shown has no metrics but those recorded.
     let recorded_series = if recorded.is_flight { recorded.series()? } else { None };
     let metrics = MetricHistory::from_run(run.as_mut(), until, recorded_series, words);
-    let mut collector = ReplayCollector::new(run.as_mut(), metrics, options, parts);
+    let agents = AgentRows::new(words);
+    let mut collector = ReplayCollector::new(run.as_mut(), metrics, agents, options, parts);
     let is_confirmed = source.drive(run.as_mut(), &mut collector)?;
     let last = run.cycle();
     let is_end = last == recorded.cycles_done;

@@ -191,3 +191,32 @@ fn a_document_has_the_parts_and_an_escaped_title() {
     assert!(text.contains("<title>&lt;/script&gt;&lt;b&gt; · Sidestep replay</title>"));
     assert!(text.contains(&replay.content.parts) && !text.contains("<b>"));
 }
+
+#[test]
+fn metrics_of_agents_are_kept_at_evenly_spaced_cycles_and_at_the_last_one() {
+    let replay = replay(ROBOTS, |_| ());
+    let agents = &replay.run()["agents"];
+    let cycles: Vec<u64> = agents["cycles"]
+        .as_array()
+        .expect("cycles")
+        .iter()
+        .map(|cycle| cycle.as_f64().expect("a number") as u64)
+        .collect();
+    let even: Vec<u64> = (0..=300).step_by(2).collect();
+    assert_eq!(cycles, even, "every second of 301 frames, of which at most 200 have a row");
+    let names = agents["names"].as_array().expect("names");
+    let place = names.iter().position(|name| name["key"] == "counts.contacts").expect("contacts");
+    let part = agents["parts"][place].as_u64().expect("a part") as usize;
+    let parts = replay.parts();
+    let (rows, used) = decode(&parts[part], 6, cycles.len());
+    assert_eq!(used, parts[part].len());
+    let source = Source::new("s.toml", ROBOTS, "");
+    let mut run = WORLDS.compile(&source).expect("valid").start(&source, 1);
+    for (cycle, row) in cycles.into_iter().zip(rows) {
+        run.advance(cycle - run.cycle());
+        let told = run.agent_metrics();
+        let contacts = |robot: usize| told[robot]["counts"]["contacts"].as_f64().expect("a number");
+        let expected: Vec<f32> = (0..6).map(|robot| contacts(robot) as f32).collect();
+        assert_eq!(row, expected, "cycle {cycle}");
+    }
+}

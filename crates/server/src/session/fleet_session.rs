@@ -3,6 +3,7 @@
 use super::page_publisher::SessionUpdatePublisher;
 use super::{SessionExit, SessionWorker};
 use crate::encode::scene;
+use crate::event_search::EventQuery;
 use crate::event_store::EventStore;
 use crate::fleet_feed::{FeedSnapshot, FleetFeed, to_protocol};
 use crate::outbox::Outbox;
@@ -146,6 +147,15 @@ impl FleetSession {
             RunMethod::Events { from, until, skip, limit } => {
                 Ok(self.log.events_reply(from..until, skip.unwrap_or(0), limit.min(MAX_EVENTS)))
             }
+            RunMethod::FindEvents { text, kinds, skip, limit } => {
+                let query = EventQuery { text: &text, kinds: kinds.as_deref(), skip, limit };
+                Ok(query.reply(&self.log, &self.fleet_scene.scenery))
+            }
+            // A fleet's metrics are those of its nodes: there is none to color its agents by.
+            RunMethod::AgentMetrics { metric: None } => {
+                let cycle = self.frame.cycle as f64;
+                Ok(ReplyBody::AgentMetrics { names: Vec::new(), cycle, values: Vec::new() })
+            }
             RunMethod::Tables {} => Ok(ReplyBody::Tables { names: Vec::new() }),
             RunMethod::Play { .. }
             | RunMethod::Pause {}
@@ -154,6 +164,7 @@ impl FleetSession {
             | RunMethod::Restart { .. }
             | RunMethod::Inspect { .. }
             | RunMethod::Metrics { .. }
+            | RunMethod::AgentMetrics { metric: Some(_) }
             | RunMethod::Source {}
             | RunMethod::Save { .. } => {
                 let remedy = "control it where it was started; its recording can be replayed";

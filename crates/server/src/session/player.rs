@@ -12,7 +12,9 @@ use super::pace::{CycleRate, CyclesPerSlice};
 use super::page_publisher::{MAX_SCANNED_BODIES, SessionUpdatePublisher};
 use super::save::SaveOptions;
 use crate::SPEED_RANGE;
+use crate::agent_metrics::AgentMetrics;
 use crate::encode::{requested_body, scene};
+use crate::event_search::EventQuery;
 use crate::outbox::Outbox;
 use crate::protocol::{
     BodyId, Problem, Reply, ReplyBody, ReplyResult, RunMethod, ServerNotification, SessionId,
@@ -188,6 +190,16 @@ impl Player {
             }
             RunMethod::Metrics { from } => {
                 Ok(self.history.metrics.metrics_reply(self.open_run.run.as_ref(), from))
+            }
+            RunMethod::AgentMetrics { metric } => {
+                let words = self.open_run.metric_words();
+                AgentMetrics::from_run(self.open_run.run.as_ref()).reply(metric.as_deref(), words)
+            }
+            RunMethod::FindEvents { text, kinds, skip, limit } => {
+                let run = self.open_run.run.as_mut();
+                self.publisher.record_events(run, &mut self.history.log, Instant::now());
+                let query = EventQuery { text: &text, kinds: kinds.as_deref(), skip, limit };
+                Ok(query.reply(&self.history.log, &self.scenery))
             }
             RunMethod::Events { from, until, skip, limit } => {
                 let run = self.open_run.run.as_mut();

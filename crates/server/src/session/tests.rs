@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use sidestep::worlds::WORLDS;
 use std::time::Instant;
 
+mod agents;
 mod fleets;
 mod metrics;
 mod ponds;

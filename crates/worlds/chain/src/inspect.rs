@@ -1,6 +1,7 @@
 //! The move that a chain's initiator wants, the vetoes and their reasons, the response of the recovery ladder, and the
 //! outcome for one connector: the cycle is tried on a copy of the state, for its conflict group alone.
 
+mod joints;
 mod motion;
 #[cfg(test)]
 mod tests;
@@ -163,6 +164,7 @@ struct ConnectorInspection<'a, const D: usize> {
 impl<const D: usize> ConnectorInspection<'_, D> {
     fn add_all_sections(&self, inspection: &mut Inspection, group: &[EntitySlot]) {
         self.add_connector_state(inspection);
+        self.add_joint_table(inspection);
         self.add_group_table(inspection, group);
         self.add_intention(inspection);
         self.add_veto_table(inspection);

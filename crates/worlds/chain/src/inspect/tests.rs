@@ -84,3 +84,35 @@ fn nobody_is_told_of_who_is_not_there() {
         assert_eq!(run.inspect(who), None, "{who:?}");
     }
 }
+
+#[test]
+fn the_joints_of_an_arm_are_told_in_degrees_with_their_limits() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../scenarios/chain");
+    let text = std::fs::read_to_string(format!("{folder}/arm.toml")).expect("shipped");
+    let source = Source::new("arm.toml", text, folder);
+    let mut run = chain_run(&source, 1).unwrap_or_else(|e| panic!("{e}"));
+    let values = |inspection: &Inspection, column: &str| {
+        let table = inspection.section("Joints").and_then(|joints| joints.table.as_ref());
+        let column = table.and_then(|table| table.column(column)).expect("a column");
+        column.cloned().collect::<Vec<FactValue>>()
+    };
+    let start = told(&*run, 0);
+    let degrees = |value_rad: f64| FactValue::degrees(value_rad);
+    assert_eq!(
+        values(&start, "value"),
+        [0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0].map(degrees),
+        "the posture of the scenario"
+    );
+    run.advance(40);
+    let later = told(&*run, 0);
+    assert_ne!(values(&later, "value"), values(&start, "value"), "it moves");
+    assert_eq!(values(&later, "highest"), values(&start, "highest"));
+    let summary = run.agent_metrics()[0]["joints"].clone();
+    let names = values(&later, "joint");
+    for (name, value) in names.iter().zip(values(&later, "value")) {
+        let FactValue::Text(name) = name else { panic!("no name") };
+        let value_rad = summary[name.as_str()].as_f64().expect("a joint");
+        let FactValue::Number { value: value_deg, unit: "°" } = value else { panic!("{value:?}") };
+        assert!((value_deg - value_rad.to_degrees()).abs() < 1e-9, "{name}");
+    }
+}

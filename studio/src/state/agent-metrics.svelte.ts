@@ -1,0 +1,63 @@
+/** The metrics of each agent, of which one at a time is asked for while bodies are colored by it. */
+
+import type { MetricName, ReplyBody } from "../protocol";
+import type { AgentValues } from "./color-mode";
+
+/** The server computes the metrics of all agents for a request: it spends no more than a tenth of the time on it. */
+const MIN_PAUSE_PER_REPLY = 10;
+
+/** Asks for the names of metrics, or for the values of one. */
+type FetchMetrics = (metric: string | null) => Promise<ReplyBody>;
+
+export class AgentMetrics {
+  /** The metrics that can be asked for; null before they are known. */
+  names = $state.raw<MetricName[] | null>(null);
+  values = $state.raw<AgentValues | null>(null);
+  #isFetching = false;
+  #dueAt_ms = 0;
+  #age = 0;
+
+  clear(): void {
+    this.names = null;
+    this.values = null;
+    this.#age++;
+    this.#isFetching = false;
+    this.#dueAt_ms = 0;
+  }
+
+  /** Fetches the names, if they are not known. */
+  async fetchNames(ask: FetchMetrics): Promise<void> {
+    if (this.names !== null) return;
+    await this.#fetch(null, ask);
+  }
+
+  /** Fetches the values of a metric at a cycle, if those that are known are of another one. */
+  async fetchValues(metric: string, cycle: number, ask: FetchMetrics): Promise<void> {
+    const { values } = this;
+    if (values?.key === metric && values.cycle === cycle) return;
+    if (values?.key === metric && performance.now() < this.#dueAt_ms) return;
+    await this.#fetch(metric, ask);
+  }
+
+  async #fetch(metric: string | null, ask: FetchMetrics): Promise<void> {
+    if (this.#isFetching) return;
+    const age = this.#age;
+    this.#isFetching = true;
+    const began_ms = performance.now();
+    try {
+      const answer = await ask(metric);
+      if (age !== this.#age || answer.is !== "agent-metrics") return;
+      const now_ms = performance.now();
+      this.#dueAt_ms = now_ms + MIN_PAUSE_PER_REPLY * (now_ms - began_ms);
+      if (metric === null) this.names = answer.names;
+      else this.values = this.#valuesOf(metric, answer.cycle, answer.values);
+    } finally {
+      if (age === this.#age) this.#isFetching = false;
+    }
+  }
+
+  #valuesOf(key: string, cycle: number, values: readonly (number | null)[]): AgentValues {
+    const name = this.names?.find((one) => one.key === key);
+    return { key, label: name?.label ?? key, unit: name?.unit ?? "", cycle, values };
+  }
+}
