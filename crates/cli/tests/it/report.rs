@@ -89,7 +89,9 @@ fn figures_for_print_have_a_size_and_words_of_their_own_and_no_title() {
     assert_eq!(told["figures"], "r/report-print");
     let files = names(&place.path("r/report-print"));
     assert!(files.iter().any(|name| name.ends_with(".png")), "{files:?}");
-    let svg = files.iter().find(|name| name.ends_with(".svg")).expect("a figure");
+    // The first one is that of the tracks, which has no such words.
+    let mut drawings = files.iter().filter(|name| name.ends_with(".svg"));
+    let svg = drawings.nth(1).expect("a figure");
     let svg = place.read(&format!("r/report-print/{svg}"));
     assert!(svg.contains("width=\"480\"") && svg.contains("Time in cycles"), "{svg}");
     assert!(!svg.contains("Events over time</text>"), "no title");
@@ -106,7 +108,9 @@ fn figures_for_print_have_a_size_and_words_of_their_own_and_no_title() {
     let ended = place.run(&["report", "r", "--figure", "svg", "--label", "none such=x"]);
     assert!(ended.err().contains("write one of `"), "{}", ended.err());
     let ended = place.run(&["report", "r", "--figure", "svg", "--figure-family", "none.ttf"]);
-    assert!(ended.err().contains("give a font file"), "{}", ended.err());
+    assert!(ended.err().contains("there is no such file"), "{}", ended.err());
+    let ended = place.run(&["report", "r", "--figure", "svg", "--figure-family", "No Such Font"]);
+    assert!(ended.err().contains("path of a .ttf or .otf file"), "{}", ended.err());
     place.json(&["report", "r", "--figure", "pdf", "--figure-style", "dark", "--figure-data"]);
     let files = names(&place.path("r/report-print"));
     let with_ending = |ending: &str| files.iter().filter(|name| name.ends_with(ending)).count();
@@ -116,6 +120,28 @@ fn figures_for_print_have_a_size_and_words_of_their_own_and_no_title() {
     let pdf = files.iter().find(|name| name.ends_with(".pdf")).expect("a figure");
     let bytes = std::fs::read(place.path(&format!("r/report-print/{pdf}"))).expect("read");
     assert!(bytes.starts_with(b"%PDF-"));
+}
+
+#[test]
+fn the_tracks_of_a_run_are_its_first_figure_for_print() {
+    let place = reported(crate::support::SCENARIO);
+    let size = ["--figure-size", "85x60", "--figure-dpi", "150"];
+    place.json(&[&["report", "r", "--figure", "svg,png,pdf", "--figure-data"][..], &size].concat());
+    let stem = "r/report-print/01-trajectories-and-where-everybody-is-at-the-end";
+    let svg = place.read(&format!("{stem}.svg"));
+    assert!(svg.contains("width=\"321\"") && svg.contains("class=\"trail\""), "{svg}");
+    assert!(svg.contains("scale-bar") && !svg.contains("sidestep 0."), "no small print: {svg}");
+    let rows = place.read(&format!("{stem}.csv"));
+    assert!(rows.starts_with("body,cycle,x_m,y_m,z_m\nrobot/0,"), "{rows}");
+    let png = image::open(place.path(&format!("{stem}.png"))).expect("a picture").to_rgb8();
+    assert_eq!(png.width(), 502, "85 mm at 150 pixels an inch");
+    assert!(png.pixels().any(|pixel| pixel.0 == [0x3C; 3]), "there are walls");
+    let large = ["--figure-size", "500x500", "--figure-dpi", "1200"];
+    let ended = place.run(&[&["report", "r", "--figure", "png"][..], &large].concat());
+    assert!(ended.err().contains("give --figure-dpi 416"), "{}", ended.err());
+    let small = ["--figure-style", "talk", "--figure-size", "30x60"];
+    let ended = place.run(&[&["report", "r", "--figure", "svg"][..], &small].concat());
+    assert!(ended.err().contains("give --figure-size 48x60"), "{}", ended.err());
 }
 
 #[test]

@@ -348,6 +348,30 @@ mod tests {
     }
 
     #[test]
+    fn bars_begin_at_zero_and_have_their_runs_on_them() {
+        let slot = |label: &str, values: [f64; 3]| Slot {
+            label: label.into(),
+            values: values.to_vec(),
+            mean: Some((values.iter().sum::<f64>() / 3.0, None)),
+            quartiles: None,
+        };
+        let slots = vec![slot("a", [4.0, 6.0, 8.0]), slot("b", [9.0, 12.0, 15.0])];
+        let chart = SlotChart::new("T", Axis::linear("hits"), slots).bars();
+        let drawn = chart.draw(&Style::CHART).unwrap();
+        let bars: Vec<&str> =
+            drawn.svg.lines().filter(|line| line.contains("class=\"bar\"")).collect();
+        let number = |line: &str, name: &str| -> f64 {
+            let rest = line.split(&format!(" {name}=\"")).nth(1).unwrap();
+            rest.split('"').next().unwrap().parse().unwrap()
+        };
+        let heights: Vec<f64> = bars.iter().map(|bar| number(bar, "height")).collect();
+        assert!((heights[1] / heights[0] - 2.0).abs() < 0.01, "means are 6 and 12: {heights:?}");
+        let bottom = |bar: &str| number(bar, "y") + number(bar, "height");
+        assert!((bottom(bars[0]) - bottom(bars[1])).abs() < 0.02, "both begin at zero");
+        assert_eq!(drawn.spots.len(), 6, "each run is a point");
+    }
+
+    #[test]
     fn each_seed_is_a_line_and_each_slot_has_its_mean() {
         let slot = |label: &str, values: [f64; 3]| Slot {
             label: label.into(),

@@ -26,7 +26,8 @@ pub(super) fn draw_floor(svg: &mut Svg, canvas: &Canvas, [lo, hi]: BoxM) {
     svg.path(&polygon(edge), r##"class="floor" fill="#F7F7F5""##);
     let step = nice_step((hi[0] - lo[0]).max(hi[1] - lo[1]), MAX_LINES);
     // A step that a double cannot resolve at these coordinates would have no end.
-    if !(step > 1e-9 * lo[0].abs().max(lo[1].abs())) {
+    let has_lines = step > 1e-9 * lo[0].abs().max(lo[1].abs());
+    if !has_lines {
         return;
     }
     for x in multiples(lo[0], hi[0], step) {
