@@ -256,12 +256,19 @@ fn fallback_text(fallback: Fallback, dt_s: f64) -> String {
     let Fallback { turn_side, turn_cycles, straight_cycles, orbit_side } = fallback;
     let mut text = String::new();
     if turn_cycles > 0 {
-        text += &format!("turn {} for {} s, ", side_text(turn_side), f64::from(turn_cycles) * dt_s);
+        let duration = duration_text(turn_cycles, dt_s);
+        text += &format!("turn {} for {duration}, ", side_text(turn_side));
     }
     if straight_cycles > 0 {
-        text += &format!("straight on for {} s, ", f64::from(straight_cycles) * dt_s);
+        text += &format!("straight on for {}, ", duration_text(straight_cycles, dt_s));
     }
     text + "orbit " + side_text(orbit_side)
+}
+
+/// Returns the duration of some cycles, to the hundredth of a second: sums of fractions have errors of rounding.
+fn duration_text(cycles: impl Into<f64>, dt_s: f64) -> String {
+    let text = format!("{:.2}", cycles.into() * dt_s);
+    format!("{} s", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
 fn side_text(side: OrbitSide) -> &'static str {
