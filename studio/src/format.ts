@@ -66,6 +66,19 @@ export function share(value: number): string {
   return `${sign(trim(percent.toFixed(digits)))}${NARROW}%`;
 }
 
+/** An amount of data, in powers of 1024. */
+export function bytes(amount: number): string {
+  const units = ["B", "KiB", "MiB", "GiB", "TiB"];
+  let size = amount;
+  let unit = 0;
+  while (size >= 1024 && unit < units.length - 1) {
+    size /= 1024;
+    unit++;
+  }
+  const digits = size < 10 && unit > 0 ? 1 : 0;
+  return `${trim(size.toFixed(digits))}${NARROW}${units[unit]}`;
+}
+
 /** Simulated time: seconds below two minutes, then minutes and hours. */
 export function time(time_s: number): string {
   if (time_s < 120) return withUnit(Math.round(time_s * 100) / 100, "s");

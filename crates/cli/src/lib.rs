@@ -8,7 +8,8 @@
 //! report.rs           a run's summary as text           report_files.rs  documents as files
 //! exit.rs             exit codes and failures           console.rs       standard output and error
 //! link.rs             the program of fleets             fleet_table.rs   its nodes as a table
-//! fleet_watch.rs      fleets that the studio watches   size.rs          sizes of figures and pictures
+//! fleet_watch.rs      fleets that the studio watches    gallery/         scenarios that the program carries
+//! size.rs             sizes of figures and pictures
 //! ```
 //!
 //! The crate `sidestep-session` drives the runs.
@@ -25,6 +26,7 @@ mod fleet_table;
 mod fleet_watch;
 mod fonts;
 mod foxglove;
+mod gallery;
 #[cfg(test)]
 mod hints;
 mod interrupt;

@@ -34,6 +34,9 @@ pub struct NewDrawing {
     pub text: &'static str,
     /// The tool with which drawing begins, by its `id`.
     pub tool: &'static str,
+    /// The text of a new scenario on the map of a file, without the map, whose keys are those of the file's use. The page
+    /// writes `{name}` in it, as a string of TOML.
+    pub text_on_map: &'static str,
 }
 
 /// A tool of the page's toolbar.

@@ -147,6 +147,7 @@ fn studio(folder: &Path, text: &str) -> (StudioServer, Page) {
         workers: 1,
         foxglove: None,
         fleets: Vec::new(),
+        gallery: &[],
     };
     let studio = StudioServer::start(options).unwrap_or_else(|e| panic!("{e}"));
     let mut page = Page::open(&studio);

@@ -2,31 +2,53 @@
 
 use crate::encode::event;
 use crate::protocol::{ReplyBody, RunEvent};
+use crate::usage::StoreBytes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{Frame, LogEvent};
 use std::ops::Range;
 
 /// Maximum number of events kept: some tens of megabytes. Further ones are counted.
 const MAX_EVENTS: usize = 100_000;
+/// Maximum number of bytes of the sentences of events; that of a usual event has some dozens.
+const MAX_WORD_BYTES: usize = 16 << 20;
 /// Number of cycles for which events that are not kept are counted together, so that the counts stay few.
-const LOSS_BUCKET_CYCLES: Cycle = 1024;
+const MIN_LOSS_BUCKET_CYCLES: Cycle = 1024;
+/// Maximum number of such counts. Where there are more, those of twice as many cycles are put together.
+const MAX_LOSS_BUCKETS: usize = 4096;
 /// Maximum number of events in a frame, the last ones: frames stay small however much happens, and
 /// the page requests the others.
 const MAX_FRAME_EVENTS: usize = 100;
 
 /// The events of one run.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct EventStore {
     /// Events as the kernel reports them: most are never requested, so they are converted only then.
     kept: Vec<LogEvent>,
+    /// Bytes of their sentences.
+    word_bytes: usize,
     /// The first cycle not computed yet.
     frontier: Cycle,
     /// Numbers of events that were not kept, with the first cycle of each bucket.
     lost: Vec<(Cycle, u64)>,
+    bucket_cycles: Cycle,
     /// The events since the last frame that was sent.
     unsent: UnsentEvents,
     /// The events since the last frame sent to Foxglove viewers, if they are served.
     unsent_to_viewers: Option<UnsentEvents>,
+}
+
+impl Default for EventStore {
+    fn default() -> Self {
+        Self {
+            kept: Vec::new(),
+            word_bytes: 0,
+            frontier: 0,
+            lost: Vec::new(),
+            bucket_cycles: MIN_LOSS_BUCKET_CYCLES,
+            unsent: UnsentEvents::default(),
+            unsent_to_viewers: None,
+        }
+    }
 }
 
 /// The last of the events that have not been reported yet.
@@ -64,21 +86,68 @@ impl EventStore {
             return;
         }
         let known = log.partition_point(|entry| entry.cycle < self.frontier);
-        let room = MAX_EVENTS.saturating_sub(self.kept.len());
-        let lost = (log.len() - known).saturating_sub(room) as u64 + frame.log_left_out;
-        self.kept.extend(log.drain(known..).take(room));
+        let mut lost = frame.log_left_out;
+        for entry in log.drain(known..) {
+            if !self.keep(entry) {
+                lost += 1;
+            }
+        }
         self.record_loss(frame.cycle - 1, lost);
         self.frontier = frame.cycle;
     }
 
+    /// Keeps an event; returns whether there was room for it.
+    fn keep(&mut self, entry: LogEvent) -> bool {
+        let words = entry.words.capacity();
+        if self.kept.len() >= MAX_EVENTS || self.word_bytes + words > MAX_WORD_BYTES {
+            return false;
+        }
+        if self.kept.len() == self.kept.capacity() {
+            // Twice as many, as usual, but never beyond the bound.
+            let more = self.kept.len().max(64).min(MAX_EVENTS - self.kept.len());
+            self.kept.reserve_exact(more);
+        }
+        self.word_bytes += words;
+        self.kept.push(entry);
+        true
+    }
+
     fn record_loss(&mut self, cycle: Cycle, lost: u64) {
+        if lost == 0 {
+            return;
+        }
+        let bucket = cycle / self.bucket_cycles;
         match self.lost.last_mut() {
-            _ if lost == 0 => {}
-            Some((last, count)) if *last / LOSS_BUCKET_CYCLES == cycle / LOSS_BUCKET_CYCLES => {
-                *count += lost
-            }
+            Some((last, count)) if *last / self.bucket_cycles == bucket => *count += lost,
             _ => self.lost.push((cycle, lost)),
         }
+        if self.lost.len() > MAX_LOSS_BUCKETS {
+            self.widen_loss_buckets();
+        }
+    }
+
+    /// Puts the counts of twice as many cycles together.
+    fn widen_loss_buckets(&mut self) {
+        self.bucket_cycles *= 2;
+        let cycles = self.bucket_cycles;
+        self.lost.dedup_by(|later, earlier| {
+            let is_same = later.0 / cycles == earlier.0 / cycles;
+            if is_same {
+                earlier.1 += later.1;
+            }
+            is_same
+        });
+    }
+
+    /// Returns the bytes of all that is kept.
+    pub(crate) fn bytes(&self) -> StoreBytes {
+        let of_events = |count: usize| count * size_of::<LogEvent>();
+        let of_counts = |count: usize| count * size_of::<(Cycle, u64)>();
+        let used =
+            of_events(self.kept.capacity()) + self.word_bytes + of_counts(self.lost.capacity());
+        // The list of counts grows to a power of two.
+        let max = of_events(MAX_EVENTS) + MAX_WORD_BYTES + of_counts(2 * MAX_LOSS_BUCKETS);
+        StoreBytes { used: used as u64, max: max as u64 }
     }
 
     /// Returns the cycle before which all events are known.
@@ -185,5 +254,23 @@ mod tests {
             (MAX_FRAME_EVENTS, (MAX_EVENTS + 7 - MAX_FRAME_EVENTS + 2) as u64)
         );
         assert_eq!(cycles(&events.events_reply(0..9, 0, u32::MAX)).1, 9);
+    }
+
+    #[test]
+    fn long_sentences_and_endless_losses_stay_within_the_bound_and_are_counted() {
+        let mut events = EventStore::default();
+        let mut told = 0;
+        for cycle in 1..=3 * MAX_LOSS_BUCKETS as Cycle {
+            let mut frame = frame(1024 * cycle, &[1024 * cycle - 1]);
+            frame.log[0].words = "w".repeat(4096);
+            told += 1;
+            events.record_ahead(&mut frame);
+            let StoreBytes { used, max } = events.bytes();
+            assert!(used <= max, "{used} of {max} bytes");
+        }
+        let reply = events.events_reply(0..Cycle::MAX, 0, u32::MAX);
+        let (kept, lost) = cycles(&reply);
+        assert!(kept.len() < MAX_EVENTS && lost >= 2 * MAX_LOSS_BUCKETS as u64);
+        assert_eq!(kept.len() as u64 + lost, told);
     }
 }

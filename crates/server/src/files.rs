@@ -1,6 +1,8 @@
 //! Files that a page may read: those below the folders given at start, after links are resolved.
 
+use crate::drops::DropFolder;
 use crate::encode::problem;
+use crate::file_search::FoundFiles;
 use crate::protocol::{FileEntry, FileKind, Problem};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -26,6 +28,8 @@ pub(crate) struct AllowedFiles {
     roots: Arc<Vec<AllowedRoot>>,
     /// Files elsewhere to which the scenarios given at start refer, links resolved.
     granted: Arc<BTreeSet<PathBuf>>,
+    /// Copies of files that people dropped on the page.
+    drops: Arc<DropFolder>,
 }
 
 /// A folder or a file given at start.
@@ -60,7 +64,7 @@ impl AllowedFiles {
             })?;
             roots.push(AllowedRoot { path: path.clone(), real });
         }
-        Ok(Self { roots: Arc::new(roots), granted: Arc::default() })
+        Ok(Self { roots: Arc::new(roots), granted: Arc::default(), drops: Arc::default() })
     }
 
     /// Also allows the files to which these scenarios refer, because a user who starts the studio with a scenario wants it
@@ -91,18 +95,40 @@ impl AllowedFiles {
     /// When it does not exist, or is elsewhere.
     pub(crate) fn resolve(&self, path: &str) -> Result<PathBuf, Problem> {
         let given = PathBuf::from(path);
-        let is_allowed = given.canonicalize().is_ok_and(|real| {
-            // A pipe or a device might keep its reader waiting forever.
-            let is_plain = real.is_file() || real.is_dir();
-            is_plain && self.contains(&real)
-        });
+        let is_allowed = self.resolve_path(&given).is_some();
         // A missing path and a forbidden one are reported alike: a page learns nothing about the rest of the disk.
         if is_allowed { Ok(given) } else { Err(outside_roots(path)) }
     }
 
-    /// Returns whether a path without links is below the folders, or a scenario given at start refers to it.
+    /// Returns the path without links of a file or a folder that a page may read.
+    pub(crate) fn resolve_path(&self, path: &Path) -> Option<PathBuf> {
+        let real = path.canonicalize().ok()?;
+        // A pipe or a device might keep its reader waiting forever.
+        let is_plain = real.is_file() || real.is_dir();
+        (is_plain && self.contains(&real)).then_some(real)
+    }
+
+    /// Returns whether a path without links is below the folders, a scenario given at start refers to it, or it is a copy
+    /// of a file that was dropped.
     pub(crate) fn contains(&self, real: &Path) -> bool {
-        self.relative_to_root(real).is_some() || self.granted.contains(real)
+        self.relative_to_root(real).is_some()
+            || self.granted.contains(real)
+            || self.drops.contains(real)
+    }
+
+    /// Returns whether a path is that of a copy of a file that was dropped.
+    pub(crate) fn is_dropped(&self, path: &Path) -> bool {
+        path.canonicalize().is_ok_and(|real| self.drops.contains(&real))
+    }
+
+    /// Returns the copies of files that were dropped.
+    pub(crate) fn drops(&self) -> &Arc<DropFolder> {
+        &self.drops
+    }
+
+    /// Returns the folders and files given at start, as they were given.
+    pub(crate) fn root_paths(&self) -> impl Iterator<Item = PathBuf> {
+        self.roots.iter().map(|root| root.path.clone())
     }
 
     /// Returns a path without links relative to the folder that it is below.
@@ -134,16 +160,18 @@ impl AllowedFiles {
         &self,
         folder: Option<&str>,
         worlds: &Worlds,
-    ) -> Result<Vec<FileEntry>, Problem> {
+    ) -> Result<FoundFiles, Problem> {
         let Some(folder) = folder else {
             let roots = self.roots.iter();
-            return Ok(roots.filter_map(|root| file_entry(&root.path, worlds, &mut 0)).collect());
+            let entries = roots.filter_map(|root| file_entry(&root.path, worlds, &mut 0)).collect();
+            return Ok(FoundFiles { entries, left_out: 0 });
         };
         let path = self.resolve(folder)?;
-        let mut paths = folder_entry_paths(&path).map_err(|e| {
+        let mut paths = folder_paths(&path).map_err(|e| {
             Problem::new(folder, format!("cannot be listed: {e}"), "give a folder that may be read")
         })?;
-        paths.sort();
+        let left_out = paths.len().saturating_sub(MAX_ENTRIES) as u64;
+        paths.truncate(MAX_ENTRIES);
         let mut foreign = 0;
         let mut entries: Vec<FileEntry> = Vec::new();
         for path in &paths {
@@ -153,13 +181,17 @@ impl AllowedFiles {
             }
         }
         entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
-        Ok(entries)
+        Ok(FoundFiles { entries, left_out })
     }
 }
 
-/// Returns the paths of the entries of a folder, at most [`MAX_ENTRIES`].
-fn folder_entry_paths(folder: &Path) -> io::Result<Vec<PathBuf>> {
-    fs::read_dir(folder)?.take(MAX_ENTRIES).map(|item| Ok(item?.path())).collect()
+/// Returns the paths of the entries of a folder, in their order.
+pub(crate) fn folder_paths(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder)?;
+    let paths: io::Result<Vec<PathBuf>> = entries.map(|item| Ok(item?.path())).collect();
+    let mut paths = paths?;
+    paths.sort();
+    Ok(paths)
 }
 
 /// Returns the problem of a path that may not be read.
@@ -188,7 +220,7 @@ fn strings_in(source: &Source) -> Result<Vec<String>, InputError> {
 
 /// Returns the entry of a file or folder; `None` if it cannot be opened. `foreign` counts the files of other programs
 /// that were read.
-fn file_entry(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<FileEntry> {
+pub(crate) fn file_entry(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<FileEntry> {
     let name = path.file_name().map_or_else(|| path.to_str(), |name| name.to_str())?;
     if name.starts_with('.') && name.len() > 1 && name != ".." {
         return None;
@@ -209,7 +241,7 @@ pub(crate) fn names_files(path: &Path) -> bool {
     has_extension(path, "toml") && !is_profile()
 }
 
-fn kind_of_folder(path: &Path) -> FileKind {
+pub(crate) fn kind_of_folder(path: &Path) -> FileKind {
     if path.join("run.json").is_file() {
         FileKind::Run
     } else if path.join("sweep.json").is_file() {
@@ -228,6 +260,9 @@ fn kind_of_file(path: &Path, worlds: &Worlds, foreign: &mut usize) -> Option<(Fi
     // Of a map only the name is looked at, so that it may be large.
     if let Some(about) = map_description(path, worlds) {
         return Some((FileKind::Map, about.to_owned()));
+    }
+    if has_extension(path, "urdf") {
+        return Some((FileKind::Model, "links and joints of a robot".into()));
     }
     if bytes > MAX_FILE_BYTES {
         return None;
@@ -265,7 +300,7 @@ fn kind_of_toml(header: TomlHeader) -> Option<(FileKind, String)> {
             let about = name.map_or(world.clone(), |name| format!("{world}: {name}"));
             Some((FileKind::Scenario, about))
         }
-        (None, Some(_)) => Some((FileKind::Sweep, String::new())),
+        (None, Some(_)) => Some((FileKind::Sweep, header.name.unwrap_or_default())),
         (None, None) => header.profile.map(|name| (FileKind::Profile, name)),
     }
 }
@@ -304,7 +339,7 @@ mod tests {
     fn a_folder_lists_what_can_be_opened() {
         let (folder, files) = places();
         let inside = folder.path().join("in");
-        let listed = files.list_folder(inside.to_str(), &WORLDS).expect("listed");
+        let listed = files.list_folder(inside.to_str(), &WORLDS).expect("listed").entries;
         let told: Vec<_> =
             listed.iter().map(|e| (e.name.as_str(), e.kind, e.about.as_str())).collect();
         assert_eq!(
@@ -320,7 +355,7 @@ mod tests {
                 ("t.scn", FileKind::Foreign, ""),
             ]
         );
-        let roots = files.list_folder(None, &WORLDS).expect("listed");
+        let roots = files.list_folder(None, &WORLDS).expect("listed").entries;
         assert_eq!((roots.len(), roots[0].name.as_str()), (1, "in"));
         assert!(files.resolve(&listed[1].path).is_ok());
     }
@@ -350,7 +385,7 @@ mod tests {
         assert!(files.list_folder(Some(&path("out")), &WORLDS).is_err());
         assert!(files.list_folder(Some(&path("in/..")), &WORLDS).is_err());
         assert!(files.resolve("/etc/passwd").is_err() && files.resolve("").is_err());
-        let listed = files.list_folder(Some(&path("in")), &WORLDS).expect("listed");
+        let listed = files.list_folder(Some(&path("in")), &WORLDS).expect("listed").entries;
         assert!(listed.iter().all(|e| e.name != "link" && e.name != "s.toml"), "{listed:?}");
         assert!(files.resolve(&path("in/deep/../a.toml")).is_ok());
     }

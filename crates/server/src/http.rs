@@ -3,14 +3,14 @@
 use crate::access::AccessError;
 use crate::request::MAX_REQUEST_BYTES;
 use crate::state::AppState;
-use crate::{page, results, socket};
+use crate::{drops, gallery, page, results, socket, usage};
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
+use axum::routing::{get, post};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -43,6 +43,9 @@ pub(crate) fn routes(state: Arc<AppState>) -> Router {
         .route("/enter", get(access_status).post(sign_in).layer(from_fn(with_body_timeout)))
         .route("/report", get(results::report))
         .route("/export", get(results::export))
+        .route("/picture", get(gallery::answer))
+        .route("/drop", post(drops::answer))
+        .route("/usage", get(usage::answer))
         .fallback(get(file))
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
         .layer(from_fn_with_state(state.clone(), check_access))

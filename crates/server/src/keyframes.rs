@@ -4,6 +4,7 @@
 //! and a seek should take about as long everywhere. When the memory is full every second one is dropped, and the next
 //! ones are twice as far apart.
 
+use crate::usage::StoreBytes;
 use sidestep_kernel::Cycle;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,6 +33,12 @@ impl MemoryBudget {
             total_bytes,
             max_bytes_per_run,
         }
+    }
+
+    /// Returns the bytes of the keyframes of all runs.
+    #[cfg(test)]
+    pub(crate) fn used_bytes(&self) -> usize {
+        self.used.load(Relaxed)
     }
 
     /// Returns the number of bytes that each run may use now; it changes as runs start and end.
@@ -97,6 +104,11 @@ impl Keyframes {
         while self.bytes > self.budget.bytes_per_run() && self.checkpoints.len() > 1 {
             self.drop_every_second();
         }
+    }
+
+    /// Returns the bytes of all keyframes, and the run's present share of the budget.
+    pub(crate) fn bytes(&self) -> StoreBytes {
+        StoreBytes { used: self.bytes as u64, max: self.budget.bytes_per_run() as u64 }
     }
 
     /// Updates the number of bytes, here and in the budget.

@@ -9,6 +9,8 @@
 //! metric_history.rs  metrics over time               agent_metrics.rs  metrics of each agent
 //! event_store.rs, event_search.rs  events      fleet_feed.rs    views of fleets
 //! files.rs     readable files        write.rs     writable files          file_choices.rs  files for a text
+//! drops.rs     files that are dropped on the page                         file_search.rs   what a file is
+//! gallery.rs   scenarios that the program carries                         usage.rs         memory, and its bounds
 //! results/     reports, exports        replay_page/    recorded runs as one file that needs no server
 //! ```
 //! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel, and take replies, states
@@ -18,12 +20,15 @@
 mod access;
 mod agent_metrics;
 mod compress;
+mod drops;
 mod encode;
 mod event_search;
 mod event_store;
 mod file_choices;
+mod file_search;
 mod files;
 mod fleet_feed;
+mod gallery;
 mod http;
 mod keyframes;
 mod limits;
@@ -39,10 +44,12 @@ mod serve;
 mod session;
 mod socket;
 mod state;
+mod usage;
 mod write;
 
 pub use encode::FrameEncoder;
 pub use fleet_feed::FleetFeed;
+pub use gallery::ShippedScenario;
 pub use request::{MAX_REQUEST_BYTES, decode};
 
 use access::AccessPolicy;
@@ -63,6 +70,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
+use usage::UsageRegistry;
 
 /// Maximum number of frames of a session in a second: what the eye takes for motion.
 pub const MAX_FRAMES_PER_S: u32 = 30;
@@ -94,6 +102,8 @@ pub struct ServerOptions {
     pub foxglove: Option<ViewerAddress>,
     /// Fleets in other processes, which are opened and only watched.
     pub fleets: Vec<Arc<FleetFeed>>,
+    /// The scenarios that the program carries.
+    pub gallery: &'static [ShippedScenario],
 }
 
 /// A running server, until it is ended or dropped.
@@ -130,6 +140,8 @@ impl StudioServer {
             budget: Arc::new(MemoryBudget::new(MAX_TOTAL_KEYFRAME_BYTES, MAX_KEYFRAME_BYTES)),
             foxglove: options.foxglove.map(|address| Arc::new(FoxgloveHost::new(address))),
             fleets: options.fleets,
+            gallery: options.gallery,
+            usage: UsageRegistry::default(),
         };
         let (shutdown, shutdown_signal) = watch::channel(false);
         let state = Arc::new(AppState::new(deps, access, options.program, open, shutdown_signal));

@@ -5,14 +5,22 @@
 //! the played run or the one ahead of it, has computed all cycles before.
 
 use crate::protocol::{MetricName, MetricRow, ReplyBody};
+use crate::usage::StoreBytes;
 use sidestep_kernel::series::{SeriesInterval, SeriesRows};
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_scenario::{MetricInfo, MetricLabel, WorldType, metric_label};
 use sidestep_session::RecordedSeries;
+use std::time::{Duration, Instant};
 
 /// A recording with fewer rows than this is computed for its charts: a run of millions of planned cycles that was
 /// interrupted early has a few rows.
 const MIN_RECORDED_ROWS: usize = 200;
+
+/// Minimum ratio of the time of play to the time spent on metrics of cycles without a row: a page asks for them several times
+/// a second, and those of some worlds take a millisecond.
+const MIN_COST_RATIO: u32 = 50;
+/// Number of rows of a run of 2^64 cycles: a thousand, and half as many for each time that the interval doubles.
+const MAX_ROWS: u64 = 28_000;
 
 /// The words of a world for its metrics, and its choice for charts.
 #[derive(Clone, Copy, Default)]
@@ -68,6 +76,16 @@ pub(crate) struct MetricHistory {
     /// For each name, its column in the rows.
     columns: Vec<usize>,
     rows: SeriesRows,
+    /// The metrics of a cycle without a row, which were computed last.
+    present: Option<PresentRow>,
+}
+
+/// The metrics of one cycle, and what they cost.
+struct PresentRow {
+    cycle: Cycle,
+    values: Vec<f64>,
+    cost: Duration,
+    computed: Instant,
 }
 
 impl MetricHistory {
@@ -92,7 +110,8 @@ impl MetricHistory {
         if !computed_keys.is_empty() {
             rows.push(run.cycle(), run.series_row());
         }
-        let mut history = Self { interval, names: Vec::new(), columns: Vec::new(), rows };
+        let mut history =
+            Self { interval, names: Vec::new(), columns: Vec::new(), rows, present: None };
         let keys = match recorded {
             None => computed_keys,
             Some(series) => {
@@ -122,21 +141,60 @@ impl MetricHistory {
         }
     }
 
-    /// Returns the rows from a number on, none if there are not so many, and the row of the run's present cycle.
-    pub(crate) fn metrics_reply(&self, run: &dyn Simulation, from: u32) -> ReplyBody {
+    /// Returns the rows from a number on, none if there are not so many, and the metrics of the run's present cycle; while
+    /// it advances, those of a cycle not long ago, where they take long to compute.
+    pub(crate) fn metrics_reply(
+        &mut self,
+        run: &dyn Simulation,
+        from: u32,
+        is_advancing: bool,
+    ) -> ReplyBody {
+        self.update_present(run, is_advancing);
         let first = (from as usize).min(self.rows.len());
-        let present = run.series_row();
+        let present = self.present.as_ref().filter(|present| !present.values.is_empty());
         let column = |&column: &usize| self.rows.columns[column][first..].iter();
         ReplyBody::Metrics {
             names: self.names.clone(),
             first: first as u32,
             cycles: self.rows.cycles_done[first..].iter().map(|&cycle| cycle as f64).collect(),
             values: self.columns.iter().map(|at| column(at).map(|v| known(*v)).collect()).collect(),
-            present: (!present.is_empty()).then(|| MetricRow {
-                cycle: run.cycle() as f64,
-                values: self.columns.iter().map(|&column| known(present[column])).collect(),
+            present: present.map(|present| MetricRow {
+                cycle: present.cycle as f64,
+                values: self.columns.iter().map(|&column| known(present.values[column])).collect(),
             }),
         }
+    }
+
+    /// Returns the bytes of all rows.
+    pub(crate) fn bytes(&self) -> StoreBytes {
+        let value_bytes = size_of::<f64>() as u64;
+        let rows = self.rows.cycles_done.capacity() as u64;
+        let values: u64 = self.rows.columns.iter().map(|column| column.capacity() as u64).sum();
+        let row_values = 1 + self.rows.columns.len() as u64;
+        // Lists grow to twice what they hold.
+        StoreBytes {
+            used: (rows + values) * value_bytes,
+            max: 2 * MAX_ROWS * row_values * value_bytes,
+        }
+    }
+
+    /// Computes the metrics of the present cycle, unless they are known, or were computed not long ago.
+    fn update_present(&mut self, run: &dyn Simulation, is_advancing: bool) {
+        let cycle = run.cycle();
+        if let Some(present) = &self.present {
+            let rest = present.cost.saturating_mul(MIN_COST_RATIO);
+            if present.cycle == cycle || (is_advancing && present.computed.elapsed() < rest) {
+                return;
+            }
+        }
+        let started = Instant::now();
+        let values = match self.rows.cycles_done.binary_search(&cycle) {
+            // Of a recording that cannot be computed again no present metrics are known, only rows.
+            Ok(row) if !run.series_columns().is_empty() => self.rows.row(row).collect(),
+            _ => run.series_row(),
+        };
+        let cost = started.elapsed();
+        self.present = Some(PresentRow { cycle, values, cost, computed: Instant::now() });
     }
 }
 

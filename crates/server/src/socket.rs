@@ -1,7 +1,9 @@
 //! The socket of one page: requests go to sessions, and their messages to the page.
 
 use crate::encode::problem;
+use crate::file_search::FoundFiles;
 use crate::files::names_files;
+use crate::gallery::gallery_reply;
 use crate::outbox::{Outbox, OutboxItem};
 use crate::protocol::{
     ClientRequest, OpenTarget, Problem, Reply, ReplyBody, ReplyResult, ServerMethod, SessionId,
@@ -14,6 +16,7 @@ use crate::session::{
     text_values_reply,
 };
 use crate::state::AppState;
+use crate::usage::server_usage;
 use axum::extract::ws::{Message, WebSocket};
 use sidestep_scenario::{ImportOptions, Source, Worlds};
 use sidestep_session::Error;
@@ -188,11 +191,31 @@ impl SocketSessions {
             ServerMethod::Files { folder } => {
                 let deps = self.state.deps.clone();
                 self.answer_in_thread(id, move || {
-                    let entries = deps.files.list_folder(folder.as_deref(), &deps.worlds)?;
-                    Ok(ReplyBody::Files { entries })
+                    let found = deps.files.list_folder(folder.as_deref(), &deps.worlds)?;
+                    Ok(files_reply(found))
                 });
                 None
             }
+            ServerMethod::Find { text } => {
+                let deps = self.state.deps.clone();
+                self.answer_in_thread(id, move || {
+                    Ok(files_reply(deps.files.find(&text, &deps.worlds)))
+                });
+                None
+            }
+            ServerMethod::Identify { path } => {
+                let deps = self.state.deps.clone();
+                self.answer_in_thread(id, move || {
+                    let entry = deps.files.identify(&path, &deps.worlds)?;
+                    Ok(ReplyBody::Identified { entry })
+                });
+                None
+            }
+            ServerMethod::Gallery {} => {
+                let deps = &self.state.deps;
+                Some(Ok(gallery_reply(deps.gallery, &deps.worlds)))
+            }
+            ServerMethod::Usage {} => Some(Ok(ReplyBody::Usage(server_usage(&self.state)))),
             ServerMethod::ImportReport { path } => {
                 let deps = self.state.deps.clone();
                 self.answer_in_thread(id, move || import_report(&deps, &path));
@@ -200,7 +223,9 @@ impl SocketSessions {
             }
             ServerMethod::Runs { folder } => {
                 let deps = self.state.deps.clone();
-                self.answer_in_thread(id, move || list_sweep_runs(&deps.files.resolve(&folder)?));
+                self.answer_in_thread(id, move || {
+                    list_sweep_runs(&deps.files.resolve(&folder)?, &deps.worlds)
+                });
                 None
             }
             ServerMethod::Open { target, seed } => self.open(id, target, seed).err().map(Err),
@@ -295,6 +320,10 @@ impl SocketSessions {
             let _ = spawn_blocking(move || catch_panic(&outbox, id, || Some(work()))).await;
         });
     }
+}
+
+fn files_reply(FoundFiles { entries, left_out }: FoundFiles) -> ReplyBody {
+    ReplyBody::Files { entries, left_out }
 }
 
 /// Returns what becomes of a file, as people read it.

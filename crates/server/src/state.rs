@@ -77,6 +77,12 @@ impl AppState {
         Ok((self.next_session.fetch_add(1, Ordering::Relaxed), permit))
     }
 
+    /// Returns the number of open sessions, and its bound.
+    pub(crate) fn session_count(&self) -> (u32, u32) {
+        let free = self.sessions.available_permits() as u32;
+        (MAX_SESSIONS - free.min(MAX_SESSIONS), MAX_SESSIONS)
+    }
+
     /// Returns the permit of a new socket; `None` if there are too many.
     pub(crate) fn acquire_socket(&self) -> Option<OwnedSemaphorePermit> {
         self.sockets.clone().try_acquire_owned().ok()

@@ -1,4 +1,4 @@
-/** One metric against cycles, drawn by uPlot. */
+/** One metric of one or several runs against cycles, drawn by uPlot. */
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
@@ -9,8 +9,20 @@ export interface PlotColors {
   ink: string;
   faint: string;
   line: string;
-  curve: string;
   accent: string;
+}
+
+/** How the line of a run looks. */
+export interface CurveStyle {
+  color: string;
+  /** Lengths of dashes and gaps in pixels; none for a whole line. */
+  dash: readonly number[];
+}
+
+/** The values of a run, and the cycles that they belong to. */
+export interface Curve {
+  cycles: readonly number[];
+  values: readonly (number | null)[];
 }
 
 export interface PlotHooks {
@@ -58,6 +70,13 @@ function withCanvasesOnProcessor<T>(create: () => T): T {
  */
 const GROWTH_INTERVAL_MS = 250;
 
+/** The last point up to this one at which a run has a value: other runs may have points in between. */
+function lastKnown(values: ArrayLike<number | null | undefined>, index: number): number {
+  let at = index;
+  while (at > 0 && values[at] === undefined) at--;
+  return at;
+}
+
 export class Plot {
   readonly #plot: uPlot;
   readonly #hooks: PlotHooks;
@@ -68,7 +87,13 @@ export class Plot {
   #cursor: number | null = null;
   #isOurs = false;
 
-  constructor(host: HTMLElement, size: { width: number; height: number }, colors: PlotColors, hooks: PlotHooks) {
+  constructor(
+    host: HTMLElement,
+    size: { width: number; height: number },
+    colors: PlotColors,
+    styles: readonly CurveStyle[],
+    hooks: PlotHooks,
+  ) {
     this.#hooks = hooks;
     const axis: uPlot.Axis = {
       stroke: colors.faint,
@@ -88,17 +113,33 @@ export class Plot {
         { ...axis, size: 26, gap: 5 },
         { ...axis, size: 54, gap: 4 },
       ],
-      series: [{}, { stroke: colors.curve, width: 1.5, points: { show: false }, paths: steps }],
-      cursor: { y: false, drag: { x: false, y: false }, points: { size: 6, fill: colors.curve } },
+      series: [
+        {},
+        ...styles.map(({ color, dash }) => ({
+          stroke: color,
+          width: 1.5,
+          dash: [...dash],
+          points: { show: false },
+          paths: steps,
+        })),
+      ],
+      cursor: {
+        y: false,
+        drag: { x: false, y: false },
+        points: { size: 6, fill: (_, series) => styles[series - 1]?.color ?? colors.ink },
+        dataIdx: (plot, series, index) => (series === 0 ? index : lastKnown(plot.data[series]!, index)),
+      },
       hooks: {
         setCursor: [(plot) => this.#onCursorMove(plot)],
         draw: [() => this.#placeLine()],
       },
     };
     // uPlot creates its canvas itself, and takes no option for it.
-    this.#plot = withCanvasesOnProcessor(() => new uPlot(options, [[], []], host));
+    this.#plot = withCanvasesOnProcessor(() => new uPlot(options, [[], ...styles.map(() => [])], host));
     this.#line.className = "now";
-    this.#line.style.cssText = `position:absolute;left:0;top:0;width:1px;height:100%;pointer-events:none;background:${colors.accent}`;
+    // Among lines of several colors it is no further one.
+    const lineColor = styles.length > 1 ? colors.faint : colors.accent;
+    this.#line.style.cssText = `position:absolute;left:0;top:0;width:1px;height:100%;pointer-events:none;background:${lineColor}`;
     this.#plot.over.append(this.#line);
     this.#placeLine();
     this.#plot.over.addEventListener("click", () => {
@@ -107,8 +148,10 @@ export class Plot {
     });
   }
 
-  setData(cycles: readonly number[], values: readonly (number | null)[]): void {
-    this.#plot.setData([[...cycles], [...values]]);
+  /** Sets the values of all runs, in the order of their styles. */
+  setData(curves: readonly Curve[]): void {
+    // Where only another run has a value, a line goes on; it ends where its own run has none.
+    this.#plot.setData(uPlot.join(curves.map(({ cycles, values }) => [[...cycles], [...values]])));
   }
 
   setSize(size: { width: number; height: number }): void {

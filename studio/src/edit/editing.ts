@@ -83,6 +83,8 @@ export interface NewDrawing {
   text: string;
   /** The tool with which drawing begins. */
   tool: string;
+  /** The text of a new scenario on the map of a file, without the map. */
+  text_on_map: string;
 }
 
 export interface Editing {

@@ -37,7 +37,15 @@ export type ServerMethod = { "do": "files",
 /**
  * Its path, as a listing gave it.
  */
-folder: string | null, } | { "do": "import-report",
+folder: string | null, } | { "do": "find",
+/**
+ * The text; all things contain an empty one.
+ */
+text: string, } | { "do": "identify",
+/**
+ * Its path, as a listing or the answer to a dropped file gave it.
+ */
+path: string, } | { "do": "gallery", } | { "do": "usage", } | { "do": "import-report",
 /**
  * Its path, as a listing gave it.
  */
@@ -240,7 +248,11 @@ path: string, } | { "kind": "new",
 /**
  * The world's name.
  */
-world: string, } | { "kind": "recording",
+world: string, } | { "kind": "shipped",
+/**
+ * Its name, as the gallery gave it.
+ */
+name: string, } | { "kind": "recording",
 /**
  * Its path, as a listing gave it.
  */
@@ -293,7 +305,19 @@ export type ReplyBody = { "is": "done" } | { "is": "files",
 /**
  * Its entries that can be opened, by name.
  */
-entries: Array<FileEntry>, } | { "is": "import-report",
+entries: Array<FileEntry>,
+/**
+ * Number of entries that were not looked at, or are not listed.
+ */
+left_out: number, } | { "is": "identified",
+/**
+ * Its entry; of a copy of a file that the server has, the entry of that file.
+ */
+entry: FileEntry, } | { "is": "gallery",
+/**
+ * Their entries.
+ */
+entries: Array<GalleryEntry>, } | { "is": "usage" } & ServerUsage | { "is": "import-report",
 /**
  * Format, properties and counts, each with its name.
  */
@@ -404,6 +428,14 @@ name: string,
  */
 is_complete: boolean,
 /**
+ * The results that differ between runs, those that the world is about first.
+ */
+columns: Array<SweepColumn>,
+/**
+ * Number of results that are equal in all runs, or not listed.
+ */
+columns_left_out: number,
+/**
  * The runs.
  */
 runs: Array<SweepRun>,
@@ -510,7 +542,70 @@ about: string, };
 /**
  * The kind of a file or a folder.
  */
-export type FileKind = "folder" | "scenario" | "run" | "recording" | "sweep" | "foreign" | "map" | "profile";
+export type FileKind = "folder" | "scenario" | "run" | "recording" | "sweep" | "foreign" | "map" | "model" | "profile";
+
+/**
+ * A scenario that the program carries.
+ */
+export type GalleryEntry = {
+/**
+ * Its name for other requests.
+ */
+name: string,
+/**
+ * The name of its world.
+ */
+world: string,
+/**
+ * Its title.
+ */
+title: string,
+/**
+ * A sentence on it.
+ */
+about: string, };
+
+/**
+ * The memory that a server uses, by what it is for.
+ */
+export type ServerUsage = {
+/**
+ * What is kept, of each session and of all together.
+ */
+stores: Array<StoreUsage>,
+/**
+ * Bytes of memory of the whole process; none where the system does not tell.
+ */
+resident_bytes: number | null,
+/**
+ * Number of open sessions, of all pages.
+ */
+sessions: number,
+/**
+ * Maximum number of open sessions.
+ */
+max_sessions: number, };
+
+/**
+ * The memory of something that grows with use.
+ */
+export type StoreUsage = {
+/**
+ * The session that it belongs to; none for what all share.
+ */
+session: number | null,
+/**
+ * What is kept, for people.
+ */
+name: string,
+/**
+ * Its bytes.
+ */
+bytes: number,
+/**
+ * The bytes that it never exceeds.
+ */
+max_bytes: number, };
 
 /**
  * A metric.
@@ -975,7 +1070,28 @@ failure: string,
 /**
  * Its recording; or its variant's scenario, which needs the seed.
  */
-replay: TargetRef, };
+replay: TargetRef,
+/**
+ * Its results, column by column; null where it has none.
+ */
+values: Array<number | null>, };
+
+/**
+ * A result of the runs of a sweep.
+ */
+export type SweepColumn = {
+/**
+ * Its name in results.
+ */
+key: string,
+/**
+ * A short label.
+ */
+label: string,
+/**
+ * Its unit; may be empty.
+ */
+unit: string, };
 
 /**
  * The text at the end of a frame.

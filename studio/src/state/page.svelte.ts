@@ -1,5 +1,6 @@
 /** Settings of the page itself: theme, width, open panels. */
 
+import type { FileEntry } from "../protocol";
 import type { Center } from "./center";
 
 export type ThemeChoice = "auto" | "light" | "dark";
@@ -41,6 +42,8 @@ class Page {
   /** Whether the canvas is being edited. */
   edits = $state(false);
   showsNew = $state(false);
+  /** The map that a new scenario is about to be made on. */
+  map = $state.raw<FileEntry | null>(null);
   /** Counts requests by keys to focus the filter; the panel reacts to changes. */
   filterRequests = $state(0);
   #systemIsDark = $state(matchMedia("(prefers-color-scheme: dark)").matches);

@@ -48,6 +48,10 @@ export class Studio {
   sideBySide = $state(false);
   /** Whether transport commands apply to all sessions. */
   inStep = $state(false);
+  /** The session whose picture takes the focus next, so that keys act on it. */
+  pictureRequest = $state.raw<{ key: number } | null>(null);
+  /** Paths of copies of dropped files, which are gone with the server. */
+  readonly copies = new Set<string>();
   readonly comparison = new Comparison();
   readonly #connection: Connection;
   readonly #environment: StudioEnvironment;
@@ -145,11 +149,22 @@ export class Studio {
     });
     if (!(await this.#openAt(session, seed))) return false;
     // A fleet is known only as long as it is on the studio's command line.
-    if (!session.isFleet && !session.isReplay) remember(target, session.run.scene.name);
+    if (!session.isFleet && !session.isReplay && !this.isCopy(target)) remember(target, session.run.scene.name);
     this.sessions = [...this.sessions, session];
     this.activeKey = session.key;
+    this.requestPicture();
     this.#deliver(session);
     return true;
+  }
+
+  /** Has the picture of the active session take the focus. */
+  requestPicture(): void {
+    this.pictureRequest = { key: this.activeKey };
+  }
+
+  /** Returns whether a target is a copy of a dropped file. */
+  isCopy(target: OpenTarget): boolean {
+    return "path" in target && this.copies.has(target.path);
   }
 
   /** Opens the target of a session; reports a refusal unless `quiet`. Returns whether it is open. */

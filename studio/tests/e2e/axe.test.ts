@@ -43,10 +43,13 @@ for (const [width, isDark] of [
 ] as const) {
   test(`at ${width} pixels, ${isDark ? "dark" : "light"}`, async () => {
     const { page } = await openPage(browser, server.url, { width, isDark });
-    await page.getByText("Nothing is open.").waitFor();
+    await page.getByRole("button", { name: /^Office building/ }).waitFor();
     expect(await findings(page)).toEqual([]);
     await page.getByRole("button", { name: /^Open a scenario/ }).click();
     await page.getByRole("button", { name: /^more/ }).waitFor();
+    expect(await findings(page)).toEqual([]);
+    await page.getByRole("button", { name: "All files" }).click();
+    await page.getByText("plan of a sweep").waitFor();
     expect(await findings(page)).toEqual([]);
     await page.keyboard.press("Escape");
     await openNew(page, "robots");
@@ -105,6 +108,7 @@ for (const [width, isDark] of [
     expect(await findings(page)).toEqual([]);
     await page.keyboard.press("Escape");
     await page.getByRole("button", { name: "Help" }).click();
+    await page.getByRole("heading", { name: "Memory of the server" }).waitFor();
     expect(await findings(page)).toEqual([]);
     await page.context().close();
   });

@@ -45,7 +45,7 @@ test("a flying fleet is shown without controls", async () => {
     expect(await page.getByRole("button", { name, exact: true }).count()).toBe(0);
   for (const key of [" ", "ArrowRight", "ArrowLeft", "b", "j", "e"]) await page.keyboard.press(key);
   const steered = server.calls.filter(
-    (call) => !["open", "credit", "select-scans", "events", "files"].includes(call.do),
+    (call) => !["open", "credit", "select-scans", "events", "files", "gallery"].includes(call.do),
   );
   expect(steered).toEqual([]);
   expect(consoleErrors).toEqual([]);

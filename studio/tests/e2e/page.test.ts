@@ -404,7 +404,7 @@ describe("results", () => {
 
   test("a sweep shows its report and its runs, and a run is opened with its seed", async () => {
     await openFile(/^sweep/);
-    await page.getByTestId("run-count").filter({ hasText: "3" }).waitFor();
+    await page.getByTestId("run-count").filter({ hasText: "7" }).waitFor();
     await page.frameLocator("iframe").getByRole("heading", { name: "Report of sweep" }).waitFor();
     await page.getByText("The sweep is not complete.").waitFor();
     await page.getByRole("searchbox", { name: "Filter runs" }).fill("= 8");
@@ -412,7 +412,7 @@ describe("results", () => {
     await page.getByRole("searchbox", { name: "Filter runs" }).fill("");
     await page
       .getByRole("listitem")
-      .getByRole("button", { name: /count = 4 seed 2/ })
+      .getByRole("button", { name: /count = 4, seed 2/ })
       .click();
     await page.getByRole("button", { name: /seed 2/ }).waitFor();
     await drawn(page);
@@ -424,7 +424,7 @@ describe("results", () => {
 
   test("a variant clicked in a report opens its first run, by name or number", async () => {
     await openFile(/^sweep/);
-    await page.getByTestId("run-count").filter({ hasText: "3" }).waitFor();
+    await page.getByTestId("run-count").filter({ hasText: "7" }).waitFor();
     const report = page.frameLocator("iframe");
     await report.getByRole("button", { name: "0001" }).click();
     await drawn(page);

@@ -1,11 +1,12 @@
 /** A small server of the studio's protocol with made-up worlds, which tests stop and restart. */
 
 import { readFileSync } from "node:fs";
-import { createServer, type Server, type ServerResponse } from "node:http";
+import { createServer, type IncomingMessage, type Server, type ServerResponse } from "node:http";
 import type { AddressInfo } from "node:net";
 import { extname, join, normalize } from "node:path";
 import { WebSocketServer, type WebSocket } from "ws";
 import type {
+  FileEntry,
   ReplyBody,
   ServerMethod,
   SessionMethod,
@@ -227,6 +228,8 @@ export class FakeServer {
     const http = createServer((request, response) => {
       if (request.url === "/enter") return void response.writeHead(this.entrance).end();
       if (/^\/(report|export)\?/.test(request.url ?? "")) return void result(request.url!, response);
+      if (request.url?.startsWith("/picture?")) return void picture(response);
+      if (request.url?.startsWith("/drop?")) return void this.#drop(request, response);
       const path = normalize(new URL(request.url ?? "/", "http://x").pathname);
       const file = path === "/" ? "/index.html" : path;
       try {
@@ -246,6 +249,19 @@ export class FakeServer {
     this.port = (http.address() as AddressInfo).port;
     this.#http = http;
     this.#timer = setInterval(() => this.#tick(), 33);
+  }
+
+  /** Paths and contents of the files that were dropped. */
+  readonly dropped: [string, string][] = [];
+
+  #drop(request: IncomingMessage, response: ServerResponse): void {
+    const path = new URL(request.url ?? "", "http://x").searchParams.get("path") ?? "";
+    const chunks: Buffer[] = [];
+    request.on("data", (chunk: Buffer) => chunks.push(chunk));
+    request.on("end", () => {
+      this.dropped.push([path, Buffer.concat(chunks).toString()]);
+      response.writeHead(200, { "content-type": "text/plain" }).end(`/copies/${path}`);
+    });
   }
 
   /** Dies as a killed process does. */
@@ -329,6 +345,10 @@ export class FakeServer {
 
   #answer(call: ServerMethod, socket: WebSocket): ReplyBody {
     if (call.do === "files") return files(call.folder);
+    if (call.do === "find") return found(call.text);
+    if (call.do === "gallery") return GALLERY;
+    if (call.do === "identify") return identified(call.path);
+    if (call.do === "usage") return usage([...this.#runs.keys()]);
     if (call.do === "import-report") return importReport(call.path);
     if (call.do === "runs") return runs();
     if (call.do === "open") {
@@ -338,7 +358,9 @@ export class FakeServer {
           ? "airspace"
           : what.kind === "new"
             ? what.world
-            : what.path.replace("broken", "robots").replace(/\.\w+$/, "");
+            : (what.kind === "shipped" ? what.name : (what.path.split("/").at(-1) ?? ""))
+                .replace("broken", "robots")
+                .replace(/\.\w+$/, "");
       const world = WORLDS[key]?.();
       if (!world) throw { ...problemOf("there is no such scenario", "choose another one"), place: key };
       if (what.kind === "recording") world.scene.is_recording = true;
@@ -364,6 +386,12 @@ export class FakeServer {
     if (answer.is === "done") say({ notice: "status", ...run.status() });
     return answer;
   }
+}
+
+/** A picture of a scenario: any will do. */
+function picture(response: ServerResponse): void {
+  const png = readFileSync(new URL("../../../docs/src/pictures/studio.png", import.meta.url));
+  response.writeHead(200, { "content-type": "image/png" }).end(png);
 }
 
 /** Reports and exports, with the headers of the real server. */
@@ -405,10 +433,12 @@ function files(folder: string | null): ReplyBody {
   if (folder !== null)
     return {
       is: "files",
+      left_out: 0,
       entries: [{ path: "crowd.toml", name: "crowd.toml", kind: "scenario", about: "Ten thousand robots" }],
     };
   return {
     is: "files",
+    left_out: 0,
     entries: [
       { path: "more", name: "more", kind: "folder", about: "" },
       ...["robots", "chain", "airspace"].map((name) => ({
@@ -422,6 +452,60 @@ function files(folder: string | null): ReplyBody {
       { path: "broken.run", name: "broken.run", kind: "run", about: "cut off" },
       { path: "chain.mcap", name: "chain.mcap", kind: "recording", about: "made up" },
       { path: "sweep", name: "sweep", kind: "sweep", about: "40 runs" },
+    ],
+  };
+}
+
+/** All files of all folders. */
+function found(text: string): ReplyBody {
+  const entries = [
+    { path: "more/crowd.toml", name: "more/crowd.toml", kind: "scenario" as const, about: "Ten thousand robots" },
+    { path: "more/hall.map", name: "more/hall.map", kind: "map" as const, about: "map of MovingAI" },
+    { path: "more/arm.urdf", name: "more/arm.urdf", kind: "model" as const, about: "links and joints of a robot" },
+    { path: "more/lag.sweep.toml", name: "more/lag.sweep.toml", kind: "sweep" as const, about: "Lag" },
+    { path: "robots.toml", name: "robots.toml", kind: "scenario" as const, about: "made up" },
+  ];
+  return {
+    is: "files",
+    left_out: text === "" ? 7 : 0,
+    entries: entries.filter(({ name, about }) => `${name} ${about}`.toLowerCase().includes(text.toLowerCase())),
+  };
+}
+
+const GALLERY: ReplyBody = {
+  is: "gallery",
+  entries: [
+    { name: "robots", world: "robots", title: "Office building", about: "Twenty-four robots of three sizes." },
+    { name: "crowd", world: "robots", title: "A crowd", about: "Ten thousand robots in a hall." },
+    { name: "chain", world: "chain", title: "Serpentine", about: "A robot with a laser, and fifteen that follow it." },
+  ],
+};
+
+/** What a file is by its name. */
+function identified(path: string): ReplyBody {
+  const name = path.split("/").at(-1) ?? path;
+  const kinds: [RegExp, FileEntry["kind"]][] = [
+    [/sweep\.toml$/, "sweep"],
+    [/\.toml$/, "scenario"],
+    [/\.map$/, "map"],
+    [/\.mcap$/, "recording"],
+    [/\.run$/, "run"],
+  ];
+  const kind = kinds.find(([ending]) => ending.test(name))?.[1];
+  if (!kind)
+    throw { ...problemOf("is nothing that the studio opens", "choose a scenario (.toml), a map"), place: name };
+  return { is: "identified", entry: { path, name, kind, about: "" } };
+}
+
+function usage(sessions: number[]): ReplyBody {
+  return {
+    is: "usage",
+    sessions: sessions.length,
+    max_sessions: 12,
+    resident_bytes: 123_456_789,
+    stores: [
+      ...sessions.map((session) => ({ session, name: "events", bytes: 2048, max_bytes: 40 << 20 })),
+      { session: null, name: "dropped files, on the disk", bytes: 0, max_bytes: 2 * 2 ** 30 },
     ],
   };
 }
@@ -444,13 +528,20 @@ function runs(): ReplyBody {
     seed: String(seed),
     failure,
     replay: { kind: "scenario", path: "robots.toml" },
+    // The third run of the first variant lies far from the others.
+    values: failure ? [null, null] : [variant === "count = 4" && seed === 3 ? 90 : 10 + seed, 0.5 + 1e-9 * seed],
   });
   return {
     is: "runs",
     name: "Made-up sweep",
     is_complete: false,
     left_out: 0,
-    runs: [run("count = 4", 1), run("count = 4", 2), run("count = 8", 1, "the disk is full")],
+    columns: [
+      { key: "contacts", label: "contacts", unit: "" },
+      { key: "speed", label: "mean speed", unit: "m/s" },
+    ],
+    columns_left_out: 4,
+    runs: [...[1, 2, 3, 4, 5, 6].map((seed) => run("count = 4", seed)), run("count = 8", 1, "the disk is full")],
   };
 }
 

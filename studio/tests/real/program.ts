@@ -33,6 +33,10 @@ export class Program {
     const proxy = {
       "/socket": { target: server, ws: true, changeOrigin: true, rewriteWsOrigin: true },
       "/enter": { target: server, changeOrigin: true },
+      "/picture": { target: server, changeOrigin: true },
+      "/drop": { target: server, changeOrigin: true, headers: { origin: server } },
+      "/usage": { target: server, changeOrigin: true },
+      "/report": { target: server, changeOrigin: true },
     };
     const page = await preview({
       configFile: false,

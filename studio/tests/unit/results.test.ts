@@ -32,6 +32,7 @@ test("requests of a report's page are validated, and runs are found by name or n
     seed,
     failure: "",
     replay: { kind: "scenario", path: "x" },
+    values: [],
   });
   const runs = [run("n=1", "7"), run("n=1", "8"), run("n=2", "7")];
   const found = (data: unknown) => {

@@ -4,6 +4,7 @@ use crate::console::Console;
 use crate::exit::{ExitCode, Failure};
 use crate::fleet_watch;
 use crate::foxglove;
+use crate::gallery::SHIPPED;
 use crate::interrupt;
 use crate::link::TlsArgs;
 use crate::scenario_args::WorkersArg;
@@ -97,6 +98,7 @@ pub(crate) fn studio(args: &StudioArgs, console: Console) -> Result<ExitCode, Fa
         workers: args.workers.count(),
         foxglove: foxglove.clone(),
         fleets: watched,
+        gallery: &SHIPPED,
     })?;
     if let Some(at) = &foxglove {
         foxglove::print_address(at, console);

@@ -43,8 +43,9 @@ pub use replay::{
     ReplaySpan,
 };
 pub use reply::{
-    FileEntry, FileKind, MetricName, MetricRow, Problem, Reply, ReplyBody, ReplyResult,
-    ServerNotification, SessionState, SessionStatus, SweepRun, TargetRef,
+    FileEntry, FileKind, GalleryEntry, MetricName, MetricRow, Problem, Reply, ReplyBody,
+    ReplyResult, ServerNotification, ServerUsage, SessionState, SessionStatus, StoreUsage,
+    SweepColumn, SweepRun, TargetRef,
 };
 pub use request::{
     BodyId, ClientRequest, OpenTarget, RunMethod, ServerMethod, SessionMethod, Speed,

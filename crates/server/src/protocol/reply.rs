@@ -39,7 +39,21 @@ pub enum ReplyBody {
     Files {
         /// Its entries that can be opened, by name.
         entries: Vec<FileEntry>,
+        /// Number of entries that were not looked at, or are not listed.
+        left_out: u64,
     },
+    /// What a file or a folder is.
+    Identified {
+        /// Its entry; of a copy of a file that the server has, the entry of that file.
+        entry: FileEntry,
+    },
+    /// The scenarios that the program carries.
+    Gallery {
+        /// Their entries.
+        entries: Vec<GalleryEntry>,
+    },
+    /// The memory that the server uses.
+    Usage(ServerUsage),
     /// What becomes of a file that is read.
     ImportReport {
         /// Format, properties and counts, each with its name.
@@ -123,6 +137,10 @@ pub enum ReplyBody {
         name: String,
         /// Whether these are all runs.
         is_complete: bool,
+        /// The results that differ between runs, those that the world is about first.
+        columns: Vec<SweepColumn>,
+        /// Number of results that are equal in all runs, or not listed.
+        columns_left_out: u32,
         /// The runs.
         runs: Vec<SweepRun>,
         /// Number of runs that are not listed.
@@ -227,8 +245,62 @@ pub struct FileEntry {
     pub about: String,
 }
 
-/// A run of a sweep.
+/// A scenario that the program carries.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct GalleryEntry {
+    /// Its name for other requests.
+    pub name: String,
+    /// The name of its world.
+    pub world: String,
+    /// Its title.
+    pub title: String,
+    /// A sentence on it.
+    pub about: String,
+}
+
+/// The memory that a server uses, by what it is for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct ServerUsage {
+    /// What is kept, of each session and of all together.
+    pub stores: Vec<StoreUsage>,
+    /// Bytes of memory of the whole process; none where the system does not tell.
+    pub resident_bytes: Option<u64>,
+    /// Number of open sessions, of all pages.
+    pub sessions: u32,
+    /// Maximum number of open sessions.
+    pub max_sessions: u32,
+}
+
+/// The memory of something that grows with use.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct StoreUsage {
+    /// The session that it belongs to; none for what all share.
+    pub session: Option<SessionId>,
+    /// What is kept, for people.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: u64,
+    /// The bytes that it never exceeds.
+    pub max_bytes: u64,
+}
+
+/// A result of the runs of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct SweepColumn {
+    /// Its name in results.
+    pub key: String,
+    /// A short label.
+    pub label: String,
+    /// Its unit; may be empty.
+    pub unit: String,
+}
+
+/// A run of a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct SweepRun {
     /// The name of its variant.
@@ -239,6 +311,8 @@ pub struct SweepRun {
     pub failure: String,
     /// Its recording; or its variant's scenario, which needs the seed.
     pub replay: TargetRef,
+    /// Its results, column by column; null where it has none.
+    pub values: Vec<Option<f64>>,
 }
 
 /// The kind of a file or a folder.
@@ -260,6 +334,8 @@ pub enum FileKind {
     Foreign,
     /// A map or an image of a floor, which a scenario can name.
     Map,
+    /// Links and joints of a robot, which a scenario can name.
+    Model,
     /// Sensors and effectors that were learned from logs, which a scenario can name.
     Profile,
 }

@@ -37,6 +37,20 @@ pub enum ServerMethod {
         /// Its path, as a listing gave it.
         folder: Option<String>,
     },
+    /// Lists everything below the folders given at start whose path or description contains a text.
+    Find {
+        /// The text; all things contain an empty one.
+        text: String,
+    },
+    /// Asks what a file or a folder is that a person wants to open.
+    Identify {
+        /// Its path, as a listing or the answer to a dropped file gave it.
+        path: String,
+    },
+    /// Lists the scenarios that the program carries.
+    Gallery {},
+    /// Asks for the memory that the server uses.
+    Usage {},
     /// Reads a file and says what becomes of it, as `sidestep inspect` does.
     ImportReport {
         /// Its path, as a listing gave it.
@@ -63,7 +77,17 @@ pub enum ServerMethod {
 
 impl ServerMethod {
     /// The names of all methods.
-    pub const NAMES: [&str; 5] = ["files", "import-report", "open", "runs", "schema"];
+    pub const NAMES: [&str; 9] = [
+        "files",
+        "find",
+        "identify",
+        "gallery",
+        "usage",
+        "import-report",
+        "open",
+        "runs",
+        "schema",
+    ];
 }
 
 /// A query or a command for a session.
@@ -238,6 +262,11 @@ pub enum OpenTarget {
     New {
         /// The world's name.
         world: String,
+    },
+    /// A scenario that the program carries.
+    Shipped {
+        /// Its name, as the gallery gave it.
+        name: String,
     },
     /// A run folder or an MCAP file of Sidestep.
     Recording {

@@ -122,7 +122,7 @@ impl<'a> ReplayCollector<'a> {
             cycles: self.cycles.iter().map(|run| run.map(|n| n as f64)).collect(),
             tables: self.parts.push_json(&self.tables)?,
             source: self.parts.push_json(&source)?,
-            metrics: self.parts.push_json(&self.metrics.metrics_reply(run, 0))?,
+            metrics: self.parts.push_json(&self.metrics.metrics_reply(run, 0, false))?,
             agents: self.agents.finish(run, self.parts)?,
             chunks: std::mem::take(&mut self.chunks),
             events,

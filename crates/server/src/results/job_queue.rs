@@ -2,6 +2,7 @@
 
 use super::HttpError;
 use crate::protocol::Problem;
+use crate::usage::StoreBytes;
 use axum::http::StatusCode;
 use sidestep_kernel::Interrupt;
 use sidestep_report::RenderedReport;
@@ -12,6 +13,9 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
+
+/// Maximum size of a report that is kept.
+const MAX_REPORT_BYTES: u64 = 64 << 20;
 
 /// The queue of jobs. A report or an export uses all processors, so several at a time would only finish later.
 pub(crate) struct JobQueue {
@@ -82,9 +86,19 @@ impl JobQueue {
         done.map_err(|_| internal_error())?.map_err(|_| internal_error())?
     }
 
-    /// Keeps a report as the last one.
+    /// Keeps a report as the last one, unless it is a very large one, which is rendered again for each of its parts.
     pub(super) fn cache_report(&self, path: PathBuf, rendered: Arc<RenderedReport>) {
+        if bytes_of(&rendered) > MAX_REPORT_BYTES {
+            return;
+        }
         *self.last_report.lock().unwrap_or_else(PoisonError::into_inner) = Some((path, rendered));
+    }
+
+    /// Returns the bytes of the report that is kept: there is one at most, as large as a page that a browser still shows.
+    pub(crate) fn report_bytes(&self) -> StoreBytes {
+        let last = self.last_report.lock().unwrap_or_else(PoisonError::into_inner);
+        let used = last.as_ref().map_or(0, |(_, report)| bytes_of(report));
+        StoreBytes { used, max: MAX_REPORT_BYTES }
     }
 
     /// Returns the report of a folder, if it is the last one.
@@ -94,6 +108,12 @@ impl JobQueue {
             .filter(|(last_path, _)| last_path == path)
             .map(|(_, rendered)| rendered.clone())
     }
+}
+
+/// Returns the bytes of the texts of a report.
+fn bytes_of(report: &RenderedReport) -> u64 {
+    let pictures: usize = report.pictures.iter().map(|picture| picture.svg.len()).sum();
+    (report.html.len() + report.markdown.len() + pictures) as u64
 }
 
 fn internal_error() -> HttpError {

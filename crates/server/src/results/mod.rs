@@ -17,6 +17,7 @@ mod runs;
 
 pub(crate) use export::answer as export;
 pub(crate) use job_queue::JobQueue;
+pub(crate) use query::QueryFields;
 pub(crate) use report::answer as report;
 pub(crate) use runs::list_sweep_runs;
 
@@ -25,7 +26,7 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 
 /// The reason why there is no result: the status for the browser, and the problem that the page shows.
-pub(super) struct HttpError(StatusCode, Problem);
+pub(crate) struct HttpError(StatusCode, Problem);
 
 impl HttpError {
     fn new(status: StatusCode, problem: Problem) -> Self {

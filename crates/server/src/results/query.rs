@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 
 /// The fields after the question mark of an address.
 #[derive(Debug, Default)]
-pub(super) struct QueryFields(BTreeMap<String, String>);
+pub(crate) struct QueryFields(BTreeMap<String, String>);
 
 impl QueryFields {
     /// Reads fields in the encoding of `encodeURIComponent`.
-    pub(super) fn from_query(query: Option<&str>) -> Self {
+    pub(crate) fn from_query(query: Option<&str>) -> Self {
         let parts = query.unwrap_or_default().split('&').filter_map(|part| part.split_once('='));
         Self(
             parts
@@ -20,7 +20,7 @@ impl QueryFields {
     }
 
     /// Returns a field with its percent signs decoded; of several of one name, the last.
-    pub(super) fn get(&self, name: &str) -> Option<&str> {
+    pub(crate) fn get(&self, name: &str) -> Option<&str> {
         self.0.get(name).map(String::as_str)
     }
 
@@ -28,7 +28,7 @@ impl QueryFields {
     ///
     /// # Errors
     /// When it is missing.
-    pub(super) fn require(&self, name: &str) -> Result<&str, HttpError> {
+    pub(crate) fn require(&self, name: &str) -> Result<&str, HttpError> {
         self.get(name).ok_or_else(|| {
             let remedy = format!("add it to the address: ?{name}=...");
             Problem::new("address", format!("it has no `{name}`"), remedy).into()

@@ -1,23 +1,39 @@
-//! The runs of a sweep, each with the target that opens it.
+//! The runs of a sweep, each with its results and the target that opens it.
 
 use crate::encode::problem;
-use crate::protocol::{Problem, ReplyBody, SweepRun, TargetRef};
+use crate::protocol::{Problem, ReplyBody, SweepColumn, SweepRun, TargetRef};
+use serde::Deserialize;
+use sidestep_experiment::sweep::{Role, RunColumn, RunTable};
+use sidestep_scenario::{MetricLabel, Source, WorldType, Worlds, metric_label};
 use sidestep_session::sweep::{FinishedRuns, Folder, read_finished};
 use std::path::Path;
 
 /// Maximum number of runs listed: a longer list is sent and shown too slowly, and nobody reads it.
 const MAX_RUNS: usize = 20_000;
+/// Maximum number of results listed of each run.
+const MAX_COLUMNS: usize = 40;
+
+/// Share of a value below which a difference is an error of rounding.
+const MAX_ROUNDING: f64 = 1e-9;
+
+/// The key of a scenario that says whose results these are.
+#[derive(Deserialize)]
+struct WorldName {
+    world: String,
+}
 
 /// Lists the runs of the sweep in a folder.
 ///
 /// # Errors
 /// When it is no sweep, none of its runs is finished, or something in it is damaged.
-pub(crate) fn list_sweep_runs(path: &Path) -> Result<ReplyBody, Problem> {
+pub(crate) fn list_sweep_runs(path: &Path, worlds: &Worlds) -> Result<ReplyBody, Problem> {
     let folder = Folder::open(path).map_err(|e| problem(&e))?;
     let FinishedRuns { table, is_complete, .. } =
         read_finished(&folder).map_err(|e| problem(&e))?;
     let plan = folder.plan();
     let names = plan.names();
+    let world_type = world_type_of(&folder, worlds);
+    let (results, columns_left_out) = listed_results(&table, world_type);
     let all = table.runs();
     let mut runs = Vec::new();
     for row in 0..all.min(MAX_RUNS) {
@@ -30,10 +46,63 @@ pub(crate) fn list_sweep_runs(path: &Path) -> Result<ReplyBody, Problem> {
             seed: trial.seed.to_string(),
             failure,
             replay: replay_target(&folder, trial.id, trial.variant),
+            values: results.iter().map(|column| finite_number(column, row)).collect(),
         });
     }
-    let left_out = all.saturating_sub(MAX_RUNS) as u64;
-    Ok(ReplyBody::Runs { name: plan.name.clone(), is_complete, runs, left_out })
+    Ok(ReplyBody::Runs {
+        name: plan.name.clone(),
+        is_complete,
+        columns: results.iter().map(|column| sweep_column(column, world_type)).collect(),
+        columns_left_out,
+        runs,
+        left_out: all.saturating_sub(MAX_RUNS) as u64,
+    })
+}
+
+/// Returns the world of a sweep; `None` where the program does not have it.
+fn world_type_of<'w>(folder: &Folder, worlds: &'w Worlds) -> Option<&'w dyn WorldType> {
+    let source = Source::read(&folder.scenario(0), &[]).ok()?;
+    worlds.find(&source.parse::<WorldName>().ok()?.world)
+}
+
+/// Returns the results in which runs differ, those that the world is about first, and the number of all others.
+fn listed_results<'t>(
+    table: &'t RunTable,
+    world_type: Option<&dyn WorldType>,
+) -> (Vec<&'t RunColumn>, u32) {
+    let chart_metrics = world_type.map_or(&[][..], WorldType::chart_metrics);
+    let rank = |name: &str| {
+        let place = chart_metrics.iter().position(|metric| *metric == name);
+        place.unwrap_or(chart_metrics.len())
+    };
+    let all: Vec<&RunColumn> = table.columns_with_role(Role::Metric).collect();
+    let mut listed: Vec<&RunColumn> =
+        all.iter().copied().filter(|column| differs(column)).collect();
+    listed.sort_by_key(|column| rank(&column.name));
+    listed.truncate(MAX_COLUMNS);
+    let left_out = (all.len() - listed.len()) as u32;
+    (listed, left_out)
+}
+
+/// Returns whether a column has numbers that differ by more than rounding.
+fn differs(column: &RunColumn) -> bool {
+    let mut low = f64::INFINITY;
+    let mut high = f64::NEG_INFINITY;
+    for value in (0..column.values.len()).filter_map(|row| finite_number(column, row)) {
+        low = low.min(value);
+        high = high.max(value);
+    }
+    high - low > MAX_ROUNDING * low.abs().max(high.abs())
+}
+
+fn finite_number(column: &RunColumn, row: usize) -> Option<f64> {
+    column.values.number(row).filter(|value| value.is_finite())
+}
+
+fn sweep_column(column: &RunColumn, world_type: Option<&dyn WorldType>) -> SweepColumn {
+    let infos = world_type.map_or(&[][..], WorldType::metric_infos);
+    let MetricLabel { words, unit, .. } = metric_label(infos, &column.name);
+    SweepColumn { key: column.name.clone(), label: words, unit: unit.unwrap_or_default().into() }
 }
 
 /// Returns the target that shows a run: its recording, or its variant's scenario, to be run with its seed.

@@ -11,6 +11,7 @@ use crate::protocol::{
     Problem, Reply, ReplyBody, ReplyResult, RunMethod, ServerNotification, SessionId, SessionState,
     SessionStatus, Speed,
 };
+use crate::usage::{SessionBytes, UsageEntry};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::Frame;
 use sidestep_session::fleet::FleetScene;
@@ -42,10 +43,16 @@ pub(super) struct FleetSession {
     number: u64,
     /// The cycle before which all events are known.
     known_until: Cycle,
+    usage: UsageEntry,
 }
 
 impl FleetSession {
-    pub(super) fn new(session: SessionId, outbox: Arc<Outbox>, feed: Arc<FleetFeed>) -> Self {
+    pub(super) fn new(
+        session: SessionId,
+        outbox: Arc<Outbox>,
+        feed: Arc<FleetFeed>,
+        usage: UsageEntry,
+    ) -> Self {
         let fleet_scene = feed.snapshot().scene;
         let publisher = SessionUpdatePublisher::new(session, outbox.clone(), &fleet_scene.scenery);
         Self {
@@ -58,6 +65,7 @@ impl FleetSession {
             frame: Frame::default(),
             number: 0,
             known_until: 0,
+            usage,
         }
     }
 
@@ -114,6 +122,7 @@ impl FleetSession {
         self.frame.log.retain(|entry| entry.cycle >= self.known_until);
         self.known_until = self.frame.cycle;
         self.log.record(&mut self.frame);
+        self.usage.set(SessionBytes { events: self.log.bytes(), ..SessionBytes::default() });
         snapshot
     }
 

@@ -5,6 +5,7 @@ use crate::event_store::EventStore;
 use crate::keyframes::Keyframes;
 use crate::metric_history::MetricHistory;
 use crate::protocol::Problem;
+use crate::usage::SessionBytes;
 use sidestep_kernel::Simulation;
 use std::time::{Duration, Instant};
 
@@ -38,6 +39,15 @@ impl RunHistory {
         self.metrics.add(&run.take_series());
         if self.keyframes.is_due(run.cycle(), computing_time) {
             self.add_keyframe(run);
+        }
+    }
+
+    /// Returns the bytes of all parts.
+    pub(super) fn bytes(&self) -> SessionBytes {
+        SessionBytes {
+            keyframes: self.keyframes.bytes(),
+            events: self.log.bytes(),
+            metrics: self.metrics.bytes(),
         }
     }
 

@@ -146,11 +146,17 @@ impl SessionWorker {
                     OpenRun::from_default_scenario(deps, &world, seed)
                 });
             }
+            OpenTarget::Shipped { name } => {
+                self.run_player(session, id, source, || OpenRun::from_shipped(deps, &name, seed));
+            }
             OpenTarget::Recording { path } => {
                 self.run_player(session, id, source, || OpenRun::from_recording(deps, &path, seed));
             }
             OpenTarget::Fleet { path } => match deps.fleet_feed(&path) {
-                Ok(feed) => FleetSession::new(session, self.outbox.clone(), feed).run(&self, id),
+                Ok(feed) => {
+                    let usage = deps.usage.add(session);
+                    FleetSession::new(session, self.outbox.clone(), feed, usage).run(&self, id);
+                }
                 Err(problem) => self.refuse(id, problem),
             },
         }

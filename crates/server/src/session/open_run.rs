@@ -7,9 +7,11 @@ use super::save::{
 use crate::encode::problem;
 use crate::files::AllowedFiles;
 use crate::fleet_feed::FleetFeed;
+use crate::gallery::{ShippedScenario, find_shipped};
 use crate::keyframes::MemoryBudget;
 use crate::metric_history::MetricWords;
 use crate::protocol::{Problem, ReplyBody};
+use crate::usage::UsageRegistry;
 use sidestep_kernel::shell::shell_quote;
 use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, Simulation};
@@ -34,6 +36,10 @@ pub(crate) struct SessionDeps {
     pub(crate) foxglove: Option<Arc<FoxgloveHost>>,
     /// The feeds of the fleets that are watched.
     pub(crate) fleets: Vec<Arc<FleetFeed>>,
+    /// The scenarios that the program carries.
+    pub(crate) gallery: &'static [ShippedScenario],
+    /// What the open sessions keep.
+    pub(crate) usage: UsageRegistry,
 }
 
 impl SessionDeps {
@@ -81,9 +87,34 @@ impl OpenRun {
         seed: Option<u64>,
     ) -> Result<Self, Problem> {
         let path = deps.files.resolve(path)?;
-        let (source, _) = read_scenario(&deps.worlds, &path, &[]).map_err(|e| problem(&e))?;
-        let file = SessionFile::open(&path, &source);
+        let (mut source, _) = read_scenario(&deps.worlds, &path, &[]).map_err(|e| problem(&e))?;
+        let mut file = SessionFile::open(&path, &source);
+        if deps.files.is_dropped(&path) {
+            // The copy is gone with the server, so the scenario is in no file until it is saved.
+            file = None;
+            source.place = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        }
         Self::from_scenario(deps, source, seed, file)
+    }
+
+    /// Opens a scenario that the program carries.
+    ///
+    /// # Errors
+    /// When there is none of this name, or its files cannot be kept anywhere.
+    pub(crate) fn from_shipped(
+        deps: SessionDeps,
+        name: &str,
+        seed: Option<u64>,
+    ) -> Result<Self, Problem> {
+        let shipped = find_shipped(deps.gallery, name)?;
+        let mut folder = deps.files.first_root_folder();
+        for (file, content) in shipped.files {
+            // Its own folder, because files of other scenarios may have the same name.
+            let kept = deps.files.drops().store(&format!("{name}/{file}"), content)?;
+            folder = kept.parent().map_or(folder, Path::to_path_buf);
+        }
+        let place = format!("{}.toml", name.rsplit('/').next().unwrap_or(name));
+        Self::from_scenario(deps, Source::new(place, shipped.text, folder), seed, None)
     }
 
     /// Opens the default scenario of a world.
@@ -271,6 +302,11 @@ impl OpenRun {
     /// Returns whether its states are computed, so that they have digests.
     pub(crate) fn is_simulated(&self) -> bool {
         self.recorded.as_ref().is_none_or(|recorded| recorded.other_build().is_none())
+    }
+
+    /// Returns what the open sessions keep.
+    pub(crate) fn usage(&self) -> &UsageRegistry {
+        &self.deps.usage
     }
 
     pub(crate) fn keyframe_budget(&self) -> &Arc<MemoryBudget> {

@@ -20,6 +20,7 @@ use crate::protocol::{
     BodyId, Problem, Reply, ReplyBody, ReplyResult, RunMethod, ServerNotification, SessionId,
     SessionState, SessionStatus, Speed,
 };
+use crate::usage::UsageEntry;
 use seek::Seek;
 use sidestep_kernel::view::Scenery;
 use sidestep_kernel::{Cycle, Interrupt};
@@ -55,6 +56,7 @@ pub(super) struct Player {
     digest: Option<(Cycle, String)>,
     /// The result of comparing a recording with its digest.
     verdict: Option<String>,
+    usage: UsageEntry,
 }
 
 impl Player {
@@ -84,6 +86,7 @@ impl Player {
             rate: CycleRate::default(),
             digest: None,
             verdict: None,
+            usage: open_run.usage().add(session),
             open_run,
             scenery,
         };
@@ -189,7 +192,10 @@ impl Player {
                 inspection(self.open_run.run.as_ref(), &body, &kinds).map(ReplyBody::Inspection)
             }
             RunMethod::Metrics { from } => {
-                Ok(self.history.metrics.metrics_reply(self.open_run.run.as_ref(), from))
+                let is_advancing =
+                    matches!(self.state, SessionState::Playing | SessionState::Seeking);
+                let run = self.open_run.run.as_ref();
+                Ok(self.history.metrics.metrics_reply(run, from, is_advancing))
             }
             RunMethod::AgentMetrics { metric } => {
                 let words = self.open_run.metric_words();
@@ -281,6 +287,7 @@ impl Player {
         let now = Instant::now();
         // Each time, because another session may have started since, and wants its share.
         self.history.keyframes.shrink_to_budget();
+        self.usage.set(self.history.bytes());
         match (self.state, self.seek) {
             (SessionState::Playing, _) => {
                 let cycle = self.cycle();

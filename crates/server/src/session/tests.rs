@@ -5,12 +5,14 @@ use crate::files::AllowedFiles;
 use crate::keyframes::MemoryBudget;
 use crate::outbox::OutboxItem;
 use crate::protocol::{BodyId, RunMethod, Speed};
+use crate::usage::UsageRegistry;
 use serde_json::{Value, json};
 use sidestep::worlds::WORLDS;
 use std::time::Instant;
 
 mod agents;
 mod fleets;
+mod memory;
 mod metrics;
 mod ponds;
 mod recordings;
@@ -48,6 +50,8 @@ fn deps(folder: &std::path::Path, workers: usize) -> SessionDeps {
         budget,
         foxglove: None,
         fleets,
+        gallery: &[],
+        usage: UsageRegistry::default(),
     }
 }
 

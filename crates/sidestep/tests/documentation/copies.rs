@@ -16,6 +16,21 @@ const COPIES: [(&str, &str); 5] = [
     ("crates/papers/scenarios", "scenarios/papers"),
 ];
 
+/// A folder whose scenarios have copies of the same names below `scenarios/`. It has pictures beside them.
+const GALLERY: &str = "crates/cli/gallery";
+
+/// Returns all files and folders that crates compile in, and their copies.
+fn copies() -> Vec<(String, String)> {
+    let mut copies: Vec<(String, String)> =
+        COPIES.iter().map(|(original, copy)| (original.to_string(), copy.to_string())).collect();
+    for name in contents(&root().join(GALLERY)).into_keys() {
+        if name.ends_with(".toml") || name.ends_with(".urdf") {
+            copies.push((format!("{GALLERY}/{name}"), format!("scenarios/{name}")));
+        }
+    }
+    copies
+}
+
 /// Returns the bytes of a file, or of all files below a folder, by their paths within it.
 fn contents(path: &Path) -> BTreeMap<String, Vec<u8>> {
     if !path.is_dir() {
@@ -53,9 +68,9 @@ fn renew(original: &Path, copy: &Path) {
 #[test]
 fn scenarios_for_users_are_copies_of_what_is_compiled_in() {
     let is_renewed = std::env::var("SIDESTEP_WRITE").is_ok_and(|what| what == "scenarios");
-    for (original, copy) in COPIES {
-        let original_path = root().join(original);
-        let copy_path = root().join(copy);
+    for (original, copy) in copies() {
+        let original_path = root().join(&original);
+        let copy_path = root().join(&copy);
         if is_renewed {
             renew(&original_path, &copy_path);
         }

@@ -174,6 +174,7 @@ pub(crate) fn editing() -> Editing {
             about: "An empty floor within walls, and one robot on it. Everything can be changed later.",
             text: include_str!("drawing.toml"),
             tool: "brush",
+            text_on_map: include_str!("on-map.toml"),
         }),
     }
 }

@@ -1,0 +1,142 @@
+//! The memory that the server uses, by what it is for. All that grows while runs are played has a bound, and all that a
+//! session keeps ends with it.
+
+use crate::drops::MAX_DROPPED_BYTES;
+use crate::protocol::{ServerUsage, SessionId, StoreUsage};
+use crate::state::AppState;
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
+use axum::response::{IntoResponse, Response};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Bytes of something that grows, and its bound.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct StoreBytes {
+    pub(crate) used: u64,
+    pub(crate) max: u64,
+}
+
+/// What a session keeps of its run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct SessionBytes {
+    pub(crate) keyframes: StoreBytes,
+    pub(crate) events: StoreBytes,
+    pub(crate) metrics: StoreBytes,
+}
+
+/// What the open sessions of a server keep, as they have told it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct UsageRegistry(Arc<Mutex<BTreeMap<SessionId, SessionBytes>>>);
+
+/// The place of an open session in the registry; it is given up when this is dropped.
+#[derive(Debug)]
+pub(crate) struct UsageEntry {
+    registry: UsageRegistry,
+    session: SessionId,
+}
+
+impl UsageRegistry {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<SessionId, SessionBytes>> {
+        // Every change is a single call, so it is right even if a thread has panicked while it held the lock.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds a session.
+    pub(crate) fn add(&self, session: SessionId) -> UsageEntry {
+        self.lock().insert(session, SessionBytes::default());
+        UsageEntry { registry: self.clone(), session }
+    }
+
+    /// Returns what each session keeps.
+    pub(crate) fn stores(&self) -> Vec<StoreUsage> {
+        let sessions = self.lock();
+        let stores = sessions.iter().flat_map(|(&session, bytes)| {
+            let SessionBytes { keyframes, events, metrics } = *bytes;
+            [
+                store(Some(session), "checkpoints to seek to", keyframes),
+                store(Some(session), "events", events),
+                store(Some(session), "metrics over time", metrics),
+            ]
+        });
+        stores.collect()
+    }
+}
+
+impl UsageEntry {
+    /// Records what the session keeps now.
+    pub(crate) fn set(&self, bytes: SessionBytes) {
+        self.registry.lock().insert(self.session, bytes);
+    }
+}
+
+impl Drop for UsageEntry {
+    fn drop(&mut self) {
+        self.registry.lock().remove(&self.session);
+    }
+}
+
+fn store(
+    session: Option<SessionId>,
+    name: &str,
+    StoreBytes { used, max }: StoreBytes,
+) -> StoreUsage {
+    StoreUsage { session, name: name.into(), bytes: used, max_bytes: max }
+}
+
+/// Returns the memory that a server uses.
+pub(crate) fn server_usage(state: &AppState) -> ServerUsage {
+    let dropped =
+        StoreBytes { used: state.deps.files.drops().used_bytes(), max: MAX_DROPPED_BYTES };
+    let mut stores = state.deps.usage.stores();
+    stores.push(store(None, "the report shown last", state.jobs.report_bytes()));
+    stores.push(store(None, "dropped files, on the disk", dropped));
+    let (sessions, max_sessions) = state.session_count();
+    ServerUsage { stores, resident_bytes: resident_bytes(), sessions, max_sessions }
+}
+
+/// Returns the memory that a server uses, as JSON: `GET /usage`.
+pub(crate) async fn answer(State(state): State<Arc<AppState>>, headers: HeaderMap) -> Response {
+    if let Err(refusal) = state.access.authorize_fetch(&headers) {
+        return refusal.into_response();
+    }
+    let about = [(CONTENT_TYPE, "application/json"), (CACHE_CONTROL, "no-store")];
+    let text = serde_json::json!(server_usage(&state)).to_string();
+    (about, text).into_response()
+}
+
+/// Returns the bytes of memory of this process; `None` where the system does not tell them in a file.
+fn resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    let kib: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(kib << 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_is_listed_while_it_is_open() {
+        let registry = UsageRegistry::default();
+        let first = registry.add(3);
+        let second = registry.add(4);
+        let metrics = StoreBytes { used: 5, max: 9 };
+        second.set(SessionBytes { metrics, ..SessionBytes::default() });
+        let told: Vec<(Option<SessionId>, u64, u64)> =
+            registry.stores().iter().map(|s| (s.session, s.bytes, s.max_bytes)).collect();
+        assert_eq!(told.len(), 6);
+        assert_eq!(told[5], (Some(4), 5, 9));
+        drop((first, second));
+        assert_eq!(registry.stores(), []);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_memory_of_the_process_is_that_of_a_program() {
+        let bytes = resident_bytes().expect("Linux tells it");
+        assert!(bytes > 1 << 20 && bytes < 1 << 40, "{bytes}");
+    }
+}
