@@ -12,6 +12,7 @@ import type { ColorLegend } from "./coloring";
 import { extentOf, flatRadiusOf } from "./extent";
 import { FloorLayer } from "./floor";
 import { drawGrid } from "./grid";
+import { drawLegend } from "./legend";
 import { drawMarks, drawScans, fillAreas } from "./marks";
 import { Overlay, type Label } from "./overlay";
 import { paletteOf, ROLES, visibleColor, packColor, type Palette } from "./palette";
@@ -45,8 +46,16 @@ export interface ViewOptions extends ColorOptions {
   links: readonly Link[];
 }
 
+/** Pixels of an image for each of the page: text and lines stay sharp in print. */
+const IMAGE_RATIO = 2;
+
 /** Bodies with names of their own are labeled up to this number. */
 const MAX_LABELS = 40;
+
+/** Pixels of the screen for each of the page, as far as they are worth their cost. */
+function screenRatio(): number {
+  return Math.min(2, window.devicePixelRatio);
+}
 
 /** A renderer with minimal features: an opaque canvas without depth is cheap to compose. */
 function createRenderer(canvas: HTMLCanvasElement, isSpace: boolean): WebGLRenderer {
@@ -128,7 +137,7 @@ export class Viewport {
 
   constructor(canvas: HTMLCanvasElement, overlay: HTMLCanvasElement, scene: Scene, isDark: boolean, camera?: Camera) {
     this.#renderer = createRenderer(canvas, scene.dimensions === 3);
-    this.#renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.#renderer.setPixelRatio(screenRatio());
     this.#overlay = new Overlay(overlay);
     this.#scene = scene;
     this.#palette = paletteOf(isDark);
@@ -174,7 +183,7 @@ export class Viewport {
     if (width_px < 2 || height_px < 2) return;
     this.#size = [width_px, height_px];
     this.#renderer.setSize(width_px, height_px, false);
-    this.#overlay.resize(width_px, height_px, Math.min(2, window.devicePixelRatio));
+    this.#overlay.resize(width_px, height_px, screenRatio());
     this.camera.resize(width_px, height_px);
     if (!this.#isFitted || this.#isWhole) this.camera.fit(this.#extent);
     this.requestDraw();
@@ -290,23 +299,41 @@ export class Viewport {
     this.requestDraw();
   }
 
-  /** The image as shown, with its text, as PNG. */
+  /** The image as shown, with its text and its legend, as PNG of twice the size. */
   snapshot(): Promise<Blob | null> {
-    const canvas = this.compose();
+    const canvas = this.compose(IMAGE_RATIO);
     return new Promise((then) => canvas.toBlob(then, "image/png"));
   }
 
-  /** The image as shown, with its text, drawn now. */
-  compose(): HTMLCanvasElement {
+  /** The image as shown, with its text and its legend, drawn now; `ratio` is the number of its pixels for each of the page. */
+  compose(ratio = screenRatio()): HTMLCanvasElement {
     // The browser clears the drawing buffer once it has shown it.
     cancelAnimationFrame(this.#request);
+    this.#drawAt(ratio);
+    const canvas = this.#copy(ratio);
+    if (ratio !== screenRatio()) this.#drawAt(screenRatio());
+    return canvas;
+  }
+
+  #drawAt(ratio: number): void {
+    if (ratio !== this.#renderer.getPixelRatio()) {
+      this.#renderer.setPixelRatio(ratio);
+      this.#overlay.resize(...this.#size, ratio);
+      this.#viewChanged = true;
+    }
     this.#draw();
+  }
+
+  /** What is on both canvases, and the legend. */
+  #copy(ratio: number): HTMLCanvasElement {
     const { domElement: picture } = this.#renderer;
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = [picture.width, picture.height];
     const pen = canvas.getContext("2d")!;
     pen.drawImage(picture, 0, 0);
     pen.drawImage(this.#overlay.canvas, 0, 0, canvas.width, canvas.height);
+    pen.scale(ratio, ratio);
+    drawLegend(pen, this.#roles, this.#size[0], this.#palette);
     return canvas;
   }
 

@@ -1,0 +1,157 @@
+/** Images and videos of the view, in a real browser against a fake server: what is in them, and their names. */
+
+import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import type { Browser, Page } from "playwright-core";
+import { afterAll, afterEach, beforeAll, expect, test } from "vitest";
+import { drawn, launch, openNew, openPage } from "../browser";
+import { FakeServer } from "../fake/server";
+import { framesOf, meanDifference, picturesOf } from "../webm";
+
+const server = new FakeServer("dist");
+let browser: Browser;
+let page: Page;
+let consoleErrors: string[];
+
+beforeAll(async () => {
+  mkdirSync("screenshots", { recursive: true });
+  await server.start();
+  browser = await launch();
+});
+afterAll(async () => {
+  await browser.close();
+  await server.stop();
+});
+afterEach(async () => {
+  await page.context().close();
+});
+
+async function visit(world: string, width = 1280): Promise<void> {
+  ({ page, consoleErrors } = await openPage(browser, server.url, { width }));
+  await openNew(page, world);
+  await drawn(page);
+}
+
+async function seek(cycle: number): Promise<void> {
+  await page.getByRole("slider", { name: "Cycle" }).fill(String(cycle));
+  await page.waitForFunction(
+    (wanted) => Number(document.querySelector("[data-testid=cycle]")!.textContent!.replace(/\D/g, "")) === wanted,
+    cycle,
+  );
+}
+
+/** Saves something of the export dialog; the file's name and its bytes. */
+async function save(button: string): Promise<{ name: string; bytes: Buffer }> {
+  const download = page.waitForEvent("download");
+  await page.getByRole("button", { name: button }).click();
+  const file = await download;
+  return { name: file.suggestedFilename(), bytes: readFileSync((await file.path())!) };
+}
+
+interface Image {
+  width: number;
+  height: number;
+  /** Red, green, blue and opacity of each pixel of its upper right corner, 600 x 200 pixels. */
+  corner: number[];
+  colors: number;
+}
+
+function readImage(bytes: Buffer): Promise<Image> {
+  return page.evaluate(
+    async (url) => {
+      const image = new Image();
+      image.src = url;
+      await image.decode();
+      const { width, height } = image;
+      const canvas = Object.assign(document.createElement("canvas"), { width, height });
+      const pen = canvas.getContext("2d", { willReadFrequently: true })!;
+      pen.drawImage(image, 0, 0);
+      const colors = new Set(new Uint32Array(pen.getImageData(0, 0, width, height).data.buffer)).size;
+      return { width, height, corner: [...pen.getImageData(width - 600, 0, 600, 200).data], colors };
+    },
+    `data:image/png;base64,${bytes.toString("base64")}`,
+  );
+}
+
+/** Number of pixels near a color. */
+function pixelsOf(data: number[], [r, g, b]: [number, number, number]): number {
+  let count = 0;
+  for (let i = 0; i < data.length; i += 4)
+    if (Math.max(Math.abs(data[i]! - r), Math.abs(data[i + 1]! - g), Math.abs(data[i + 2]! - b)) < 12) count++;
+  return count;
+}
+
+/** The colors of the legend that the page shows. */
+function legendColors(): Promise<[number, number, number][]> {
+  return page
+    .locator(".legend .swatch")
+    .evaluateAll((swatches) =>
+      swatches.map((one) => getComputedStyle(one).borderTopColor.match(/\d+/g)!.slice(0, 3).map(Number)),
+    ) as Promise<[number, number, number][]>;
+}
+
+for (const width of [1280, 400]) {
+  test(`an image has twice the size, with the legend, at ${width} pixels`, async () => {
+    await visit("robots", width);
+    await seek(300);
+    const size = await page.locator(".view").evaluate((view) => [view.clientWidth, view.clientHeight]);
+    const canvas = (): Promise<number[]> =>
+      page.locator("canvas.picture").evaluate((one: HTMLCanvasElement) => [one.width, one.height]);
+    const before = await canvas();
+    await page.getByRole("button", { name: "Export…" }).click();
+    const plain = await readImage((await save("Image (PNG)")).bytes);
+    await page.keyboard.press("Escape");
+    await page.locator(".agents").getByRole("option").nth(2).click();
+    await page.locator(".legend").waitFor({ state: "attached" });
+    const colors = await legendColors();
+    expect(colors.length).toBeGreaterThan(1);
+    await page.getByRole("button", { name: "Export…" }).click();
+    const { name, bytes } = await save("Image (PNG)");
+    writeFileSync(`screenshots/image-${width}.png`, bytes);
+    const image = await readImage(bytes);
+    expect(name).toMatch(/^[\w.-]+-300\.png$/);
+    expect([image.width, image.height]).toEqual(size.map((side) => 2 * side));
+    expect(image.colors).toBeGreaterThan(20);
+    for (const color of colors)
+      expect(pixelsOf(image.corner, color)).toBeGreaterThan(pixelsOf(plain.corner, color) + 20);
+    expect(await canvas()).toEqual(before);
+    expect(consoleErrors).toEqual([]);
+  });
+}
+
+test("a video of a run that goes on has each of its frames, and shows their cycles", async () => {
+  await visit("robots");
+  await page.getByLabel("Speed", { exact: true }).selectOption("10");
+  await page.getByRole("button", { name: "Export…" }).click();
+  await page.getByLabel("from cycle").fill("20");
+  await page.getByLabel("to", { exact: true }).fill("160");
+  const { name, bytes } = await save("Video (WebM)");
+  expect(name).toMatch(/^[\w.-]+-20-160\.webm$/);
+  const words = await page.getByText(/at the speed of the transport/).textContent();
+  const frames = framesOf(bytes);
+  const { width, height, duration_s, pictures } = await picturesOf(browser, bytes, [0, 1e6], 160);
+  expect(frames, words!).toBe(Math.round(30 * duration_s));
+  expect(frames).toBeGreaterThan(20);
+  expect([width % 2, height % 2]).toEqual([0, 0]);
+  expect(new Set(pictures[0]).size).toBeGreaterThan(5);
+  // The robots have moved between the first and the last frame.
+  const moved = meanDifference(pictures[0]!, pictures[1]!);
+  expect(moved).toBeGreaterThan(0.05);
+  // The last frame is what the page shows at the last cycle.
+  await seek(160);
+  const view = await save("Image (PNG)");
+  const shown = await page.evaluate(
+    async ([url, small, high]) => {
+      const image = new Image();
+      image.src = url;
+      await image.decode();
+      const canvas = Object.assign(document.createElement("canvas"), { width: small, height: high });
+      const pen = canvas.getContext("2d")!;
+      pen.drawImage(image, 0, 0, small, high);
+      return [...pen.getImageData(0, 0, small, high).data];
+    },
+    [`data:image/png;base64,${view.bytes.toString("base64")}`, 160, Math.round((160 * height) / width)] as const,
+  );
+  expect(meanDifference(pictures[1]!, shown)).toBeLessThan(6);
+  expect(meanDifference(pictures[1]!, shown)).toBeLessThan(meanDifference(pictures[0]!, shown));
+  expect(consoleErrors).toEqual([]);
+});
