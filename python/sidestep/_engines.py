@@ -82,6 +82,7 @@ class TaskPool:
         self._executor = engine if isinstance(engine, Executor) else self._create(engine)
         self.at_once = at_once or parallelism(self._executor)
         self._scenarios: dict[int, Bundle] = {}
+        self._series: list[str] | None = None
         self._trial_s: float | None = None
         self._attempts = 0
 
@@ -98,8 +99,12 @@ class TaskPool:
             raise input_error("engine", cause, "return a concurrent.futures.Executor")
         return executor
 
-    def run(self, build: str, trials: Sequence[Trial]) -> Steps:
-        """Runs all trials; yields the numbers of variants whose scenarios it needs, and outcomes as they arrive."""
+    def run(self, build: str, trials: Sequence[Trial], series: list[str] | None = None) -> Steps:
+        """Runs all trials; yields the numbers of variants whose scenarios it needs, and outcomes as they arrive.
+
+        ``series`` are the metrics that the trials keep over time; None for those that their world is about.
+        """
+        self._series = series
         with driving():
             yield from self._run(build, trials)
 
@@ -146,7 +151,7 @@ class TaskPool:
             scenarios.append((variant, self._scenarios[variant]))
         task.sent_s = time.monotonic()
         try:
-            copy = self._executor.submit(run_task, build, scenarios, task.trials)
+            copy = self._executor.submit(run_task, build, scenarios, task.trials, self._series)
         except BrokenExecutor as error:
             copy = Future()
             copy.set_exception(error)
@@ -265,10 +270,10 @@ class RayExecutor(Executor):
         """Submits a task; scenarios are sent once per variant and node."""
         if fn is not run_task:
             raise TypeError("this executor only runs the tasks of sweeps")
-        build, scenarios, trials = args
+        build, scenarios, trials, series = args
         numbers = [variant for variant, _ in scenarios]
         sent = [self._stored(variant, bundle) for variant, bundle in scenarios]
-        future: Future[Any] = self._remote.remote(build, trials, numbers, *sent).future()
+        future: Future[Any] = self._remote.remote(build, trials, series, numbers, *sent).future()
         return future
 
     def _stored(self, variant: int, bundle: Bundle) -> Any:
@@ -281,8 +286,10 @@ class RayExecutor(Executor):
         return known[1]
 
 
-def _run_on_ray(build: str, trials: list[Trial], variants: list[int], *bundles: Bundle) -> list[str]:
-    return run_task(build, list(zip(variants, bundles, strict=True)), trials)
+def _run_on_ray(
+    build: str, trials: list[Trial], series: list[str] | None, variants: list[int], *bundles: Bundle
+) -> list[str]:
+    return run_task(build, list(zip(variants, bundles, strict=True)), trials, series)
 
 
 def task_pool(engine: Engine, workers: int | None) -> TaskPool | None:

@@ -290,12 +290,13 @@ def run_sweep(
     options: Mapping[str, Any],
     out: str | PathLike[str] | None,
     workers: int,
-    begin: Callable[[str, list[Trial]], Any] | None,
+    begin: Callable[[str, list[Trial], list[str] | None], Any] | None,
 ) -> Sweep: ...
 def run_task(
     build: str,
     scenarios: Sequence[tuple[int, tuple[str, list[tuple[str, bytes]]]]],
     trials: Sequence[Trial],
+    series: Sequence[str] | None = None,
 ) -> list[str]: ...
 def compare_methods(
     scenario: Scenario | str | PathLike[str] | Mapping[str, Any],

@@ -93,6 +93,7 @@ def sweep(
     seed: int | None = None,
     metrics: Sequence[str] = (),
     baseline: str | Mapping[str, Any] | None = None,
+    series: Sequence[str] | None = None,
     record: bool = False,
     workers: int | None = None,
     out: str | os.PathLike[str] | None = None,
@@ -104,7 +105,8 @@ def sweep(
     key, and every combination is a variant; ``set`` and ``cycles`` apply to all variants. Each is run ``replicate``
     times (10), or ``until`` the 95 % intervals of means are narrow: ``"ci=0.05"``, a fraction of the mean, or ``"abs=2.5"``,
     in the unit of the metric, and at most ``max_runs`` (1000) times. Replicate `k` of every variant has the seed ``seed + k``.
-    ``metrics`` are those to report, ``baseline`` the variant to compare with: its name or its values.
+    ``metrics`` are those to report, ``baseline`` the variant to compare with: its name or its values. ``series`` are the
+    metrics to keep over time, instead of those that the world is about.
 
     With ``out`` the runs are kept in a folder, byte for byte that of the command: Ctrl-C or a kill loses no finished
     run, and the same call continues. ``record`` keeps a run folder of every run in it.
@@ -147,6 +149,7 @@ def sweep(
         "baseline_name": baseline if isinstance(baseline, str) else None,
         "seed": _seed(seed),
         "record": record,
+        "series": None if series is None else _names("series", series),
     }
     _count("workers", workers, 1024)
     if record and engine != "local":

@@ -47,6 +47,7 @@ pub(crate) struct SweepOptions<'py> {
     baseline_name: Option<String>,
     seed: Option<u64>,
     record: bool,
+    series: Option<Vec<String>>,
 }
 
 /// A requested sweep, read and not compiled yet.
@@ -98,6 +99,7 @@ impl SweepOptions<'_> {
             baseline: has_baseline.then_some(baseline),
             first_seed: self.seed,
             record: self.record,
+            series: self.series.clone(),
         })
     }
 
@@ -228,7 +230,8 @@ impl PyExecutor {
     ) -> PyResult<()> {
         let trials = batch.trials().iter().map(|trial| to_python_trial(py, trial));
         let trials = trials.collect::<PyResult<Vec<_>>>()?;
-        let generator = self.begin.bind(py).call1((worlds::list().build(), trials))?;
+        let series = batch.series().map(<[String]>::to_vec);
+        let generator = self.begin.bind(py).call1((worlds::list().build(), trials, series))?;
         let mut answer = py.None();
         loop {
             let yielded = match generator.call_method1("send", (answer,)) {
@@ -358,11 +361,13 @@ fn integers(values: impl Iterator<Item = u64>) -> ColumnValues {
 ///
 /// Raises InputError when the sweep is of another build of sidestep.
 #[pyfunction]
+#[pyo3(signature = (build, scenarios, trials, series=None))]
 pub(crate) fn run_task(
     py: Python<'_>,
     build: String,
     scenarios: Vec<(u32, Bundle)>,
     trials: Vec<TrialTuple>,
+    series: Option<Vec<String>>,
 ) -> PyResult<Vec<String>> {
     let scenarios = scenarios
         .into_iter()
@@ -372,7 +377,7 @@ pub(crate) fn run_task(
         .into_iter()
         .map(|(id, variant, replicate, seed)| Trial { id, variant, replicate, seed })
         .collect();
-    let task = Task { build, scenarios, trials };
+    let task = Task { build, scenarios, trials, series };
     let outcomes = run_polling(py, |watcher| task.run(worlds::list(), watcher))?;
     let outcomes = outcomes.map_err(|e| error::session_error(&e))?;
     outcomes.iter().map(outcome_text).collect()

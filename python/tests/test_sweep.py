@@ -460,6 +460,14 @@ def test_a_slow_task_is_sent_again_and_whichever_comes_first_counts(floor, tmp_p
     assert files(tmp_path / "slow") == files(tmp_path / "local")
 
 
+def test_the_metrics_that_are_kept_over_time_are_chosen_with_every_engine(floor):
+    with ThreadPoolExecutor(2) as pool:
+        for engine in ("local", pool):
+            swept = sidestep.sweep(floor, replicate=2, series=["actions"], engine=engine)
+            assert set(swept.bands["metric"]) == {"actions"}
+            assert "actions" in swept.series.columns
+
+
 def sent_tasks(floor):
     """The arguments of the tasks of a small sweep."""
     sent = []
@@ -499,7 +507,7 @@ def test_a_task_that_is_run_twice_gives_the_same_outcomes_to_the_bit(floor):
 
 
 def test_tasks_refuse_the_sweep_of_another_build(floor):
-    build, scenarios, cells = sent_tasks(floor)[0]
+    build, scenarios, cells, _ = sent_tasks(floor)[0]
     with pytest.raises(sidestep.InputError, match="install the same build"):
         run_task(build + "x", scenarios, cells)
     with ProcessPoolExecutor(1, mp_context=SPAWN) as pool:

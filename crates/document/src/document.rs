@@ -14,6 +14,9 @@ pub struct Document {
     pub lead: Text,
     /// Everything else, from top to bottom.
     pub blocks: Vec<Block>,
+    /// The path of a page beside the report that shows what it is about: the replay of a run, or those of a sweep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replay: Option<String>,
 }
 
 /// A part of a report.
@@ -179,7 +182,7 @@ fn push_plain(spans: &mut Vec<Span>, text: &str) {
 impl Document {
     /// Returns a report that has only a title and `lead`.
     pub fn new(title: impl Into<String>, lead: impl Into<Text>) -> Self {
-        Self { title: title.into(), lead: lead.into(), blocks: Vec::new() }
+        Self { title: title.into(), lead: lead.into(), blocks: Vec::new(), replay: None }
     }
 
     /// Starts a section.

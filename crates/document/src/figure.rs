@@ -290,13 +290,42 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
     /// Whether a page shows only the title until a reader opens it.
     pub is_folded: bool,
+    /// The moment of the run that each row is about; empty where rows are about none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub moments: Vec<RunMoment>,
+}
+
+/// A moment of a run, which a replay shows.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RunMoment {
+    /// The cycle.
+    pub cycle: u64,
+    /// The agent that it is about, as a replay names it: its number, and that of its part, if it has one.
+    pub agent: Option<String>,
+}
+
+impl RunMoment {
+    /// Returns the end of a replay's address that opens the moment: `cycle=12&agent=8`.
+    pub fn fragment(&self) -> String {
+        match &self.agent {
+            Some(agent) => format!("cycle={}&agent={agent}", self.cycle),
+            None => format!("cycle={}", self.cycle),
+        }
+    }
 }
 
 impl Table {
     /// Returns a table without rows.
     pub fn new(title: impl Into<String>, note: impl Into<String>, columns: &[&str]) -> Self {
         let columns = columns.iter().map(|c| (*c).to_string()).collect();
-        Self { title: title.into(), note: note.into(), columns, rows: Vec::new(), is_folded: false }
+        Self {
+            title: title.into(),
+            note: note.into(),
+            columns,
+            rows: Vec::new(),
+            is_folded: false,
+            moments: Vec::new(),
+        }
     }
 
     /// Returns the same table, of which a page shows the title alone until it is opened.

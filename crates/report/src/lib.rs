@@ -1,11 +1,16 @@
 #![doc = include_str!("../README.md")]
 
 mod chart;
+mod gallery;
 mod html;
 pub mod markdown;
 mod print;
 
+pub use gallery::{Gallery, GalleryMark, GalleryMetric, GalleryRun, GalleryValue, gallery_page};
 pub use print::{FigureLook, PrintFigure, PrintStyle};
+
+/// The text of a gallery.
+pub use sidestep_document::document::Text;
 
 use sidestep_document::Document;
 use sidestep_document::document::Block;

@@ -1,6 +1,7 @@
 //! Documents as Markdown.
 
 use crate::SvgFile;
+use crate::html::REPLAY_WORDS;
 use sidestep_document::Document;
 use sidestep_document::Table;
 use sidestep_document::claim::{self, Claim};
@@ -10,6 +11,7 @@ use std::fmt::Write;
 /// Returns a document as text; `folder` holds the `pictures`, one for each figure and picture.
 pub(crate) fn text(document: &Document, folder: &str, pictures: &[SvgFile]) -> String {
     let mut parts = vec![format!("# {}", escaped(&document.title)), spans(&document.lead)];
+    parts.extend(document.replay.as_ref().map(|replay| format!("[{REPLAY_WORDS}]({replay})")));
     let mut pictures = pictures.iter();
     for block in &document.blocks {
         parts.push(match block {

@@ -165,6 +165,11 @@ impl EventStore {
         self.lost.iter().map(|(_, count)| count).sum()
     }
 
+    /// Returns the numbers of events that were not kept, with the first cycle of each bucket.
+    pub(crate) fn lost(&self) -> &[(Cycle, u64)] {
+        &self.lost
+    }
+
     /// Takes the last events since the last call, and the number of those that are not among them.
     pub(crate) fn take_unsent(&mut self) -> (Vec<RunEvent>, u64) {
         let UnsentEvents { entries, left_out } = std::mem::take(&mut self.unsent);

@@ -12,6 +12,7 @@
 //! drops.rs     files that are dropped on the page                         file_search.rs   what a file is
 //! gallery.rs   scenarios that the program carries                         usage.rs         memory, and its bounds
 //! results/     reports, exports        replay_page/    recorded runs as one file that needs no server
+//! sweep_gallery/  runs of a sweep as pages
 //! ```
 //! A session is a thread that owns a `Simulation`. Sockets pass requests to it by a channel, and take replies, states
 //! and frames from an outbox; sessions put them there without waiting. So no action or omission of a page affects a
@@ -44,6 +45,7 @@ mod serve;
 mod session;
 mod socket;
 mod state;
+pub mod sweep_gallery;
 mod usage;
 mod write;
 

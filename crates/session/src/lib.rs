@@ -17,6 +17,7 @@
 //! files.rs         files written completely or not      fleet.rs         the job of agents as processes
 //! inspect.rs       what any file is, and what becomes of it
 //! trajectory.rs    the motions of arms in a recorded run
+//! thumbnail.rs     a small picture of a run
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the
@@ -50,6 +51,7 @@ mod scenario;
 mod summary;
 #[cfg(test)]
 mod testing;
+mod thumbnail;
 mod trajectory;
 mod watcher;
 
@@ -71,7 +73,7 @@ pub use managed_run::{ManagedRun, OutputPaths, RestoreError};
 pub use pacer::Pacer;
 pub use picture::{PictureLook, png_bytes, write_png};
 pub use polling::run_polling;
-pub use recorded_run::RecordedRun;
+pub use recorded_run::{RecordedRun, RunEnd};
 pub use recorded_series::RecordedSeries;
 pub use replay::{ReplayReport, replay_all, replay_to};
 pub use row_store::RowSelection;
@@ -80,5 +82,6 @@ pub use run_tables::{RecordedCsv, csv_table, read_summary};
 pub use scenario::{GivenScenario, problems, read_scenario};
 pub use sidestep_record::{Playback, PlaybackPhase, PlaybackRequest};
 pub use summary::{Phases, RunStatus, Summary};
+pub use thumbnail::Thumbnail;
 pub use trajectory::{ArmTrajectory, arm_trajectories};
-pub use watcher::{NoWatcher, Progress, Watcher};
+pub use watcher::{NestedWatcher, NoWatcher, Progress, ProgressGuard, Watcher};

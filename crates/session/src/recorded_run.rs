@@ -5,6 +5,8 @@ use crate::identity::Producer;
 use crate::orders::replay_recorded;
 use crate::playback::RecordedPlayback;
 use crate::run_recorder::{restore_run, write_inputs};
+use crate::sweep::{Folder, check_build};
+use sidestep_experiment::sweep::Trial;
 use sidestep_kernel::Simulation;
 use sidestep_kernel::checkpoint::decode_header;
 use sidestep_kernel::shell::sidestep_command;
@@ -43,6 +45,15 @@ pub struct RecordedRun {
     _unpacked: Option<tempfile::TempDir>,
 }
 
+/// The end of a run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunEnd {
+    /// Number of cycles done.
+    pub cycles: Cycle,
+    /// Digest of the state after them.
+    pub digest: String,
+}
+
 /// Name of the folder of files beside a resolved scenario.
 const INPUTS: &str = "inputs";
 
@@ -57,6 +68,42 @@ impl RecordedRun {
         } else {
             Ok(Self::from_folder(worlds, path)?)
         }
+    }
+
+    /// Returns the run of a trial as one that is computed again: the sweep's table has its length and the digest of its
+    /// end.
+    ///
+    /// # Errors
+    /// When another build made the sweep, or the scenario of its variant is not as it was planned.
+    pub fn from_sweep(
+        worlds: &Worlds,
+        folder: &Folder,
+        trial: Trial,
+        end: RunEnd,
+    ) -> Result<Self, InputError> {
+        check_build(worlds, folder)?;
+        folder.check_variant(trial.variant)?;
+        let file = folder.scenario(trial.variant);
+        let source = Source::read(&file, &[])?.with_overrides(&[format!("seed={}", trial.seed)])?;
+        let manifest = folder.manifest();
+        Ok(Self {
+            worlds: worlds.clone(),
+            producer: Producer {
+                version: manifest.program_version.clone(),
+                build: manifest.build.clone(),
+            },
+            is_complete: true,
+            cycles_done: end.cycles,
+            digest: Some(end.digest),
+            origins: Vec::new(),
+            is_flight: false,
+            is_cut_off: false,
+            folder: None,
+            source,
+            base: file.parent().unwrap_or(Path::new("")).to_path_buf(),
+            path: file,
+            _unpacked: None,
+        })
     }
 
     fn from_folder(worlds: &Worlds, path: &Path) -> Result<Self, InputError> {

@@ -67,7 +67,7 @@ pub struct NoWatcher;
 impl Watcher for NoWatcher {}
 
 /// A watcher of larger work: it passes on requests to stop, and does not report the cycles of the parts.
-pub(crate) struct NestedWatcher<'a>(pub(crate) &'a dyn Watcher);
+pub struct NestedWatcher<'a>(pub &'a dyn Watcher);
 
 impl Watcher for NestedWatcher<'_> {
     fn warn(&self, error: &Error) {
@@ -88,10 +88,11 @@ impl Watcher for NestedWatcher<'_> {
 }
 
 /// A piece of work that is being watched; its end is always reported.
-pub(crate) struct ProgressGuard<'a>(pub(crate) &'a dyn Watcher);
+pub struct ProgressGuard<'a>(pub &'a dyn Watcher);
 
 impl ProgressGuard<'_> {
-    pub(crate) fn report(&self, progress: Progress<'_>) {
+    /// Passes on progress.
+    pub fn report(&self, progress: Progress<'_>) {
         self.0.on_progress(progress);
     }
 }

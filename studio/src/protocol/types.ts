@@ -1234,9 +1234,9 @@ digests: number | null,
  */
 cycles: Array<[number, number, number]>,
 /**
- * The part with all body tables, in the order of their numbers from 1 on.
+ * The parts with body tables, in the order of their numbers from 1 on.
  */
-tables: number,
+tables: Array<ReplayTables>,
 /**
  * The part with the reply to the request for the scenario.
  */
@@ -1261,6 +1261,10 @@ events: Array<ReplaySpan>,
  * Number of events that are not in the file.
  */
 events_left_out: number,
+/**
+ * Cycles with such events, and their numbers; cycles near each other are counted together.
+ */
+events_lost: Array<[number, number]>,
 /**
  * The parts with inspections, in their order.
  */
@@ -1290,6 +1294,32 @@ cycles: Array<number>,
  * For each metric, the part with its values, as a plane with a channel for each agent and a time for each row.
  */
 parts: Array<number>, };
+
+/**
+ * A part with body tables, see [`ReplayTablesPart`].
+ */
+export type ReplayTables = {
+/**
+ * Its number.
+ */
+part: number,
+/**
+ * Number of tables.
+ */
+tables: number, };
+
+/**
+ * Some consecutive body tables: each is a selection of the bodies of all.
+ */
+export type ReplayTablesPart = {
+/**
+ * The bodies of all tables, in the order that all have. Its session and its number mean nothing.
+ */
+all: BodyTable,
+/**
+ * For each table the bodies that come or go with it; before the first one there is none.
+ */
+changes: Array<Array<number>>, };
 
 /**
  * A part with frames.

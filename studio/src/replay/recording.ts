@@ -8,6 +8,7 @@ import type {
   ReplayInspection,
   ReplayRun,
   ReplaySpan,
+  ReplayTablesPart,
   ReplyBody,
   RunEvent,
 } from "../protocol";
@@ -16,6 +17,7 @@ import { decodeChunk, type FrameColumns } from "./chunk";
 import type { Parts } from "./parts";
 import { ByteReader, decodePlane } from "./plane";
 import { bodyNames, findEvents, type EventQuery } from "./search";
+import { selectTable } from "./tables";
 
 /** Number of decoded parts that are kept: a seek within them is immediate. */
 const MAX_KEPT_PARTS = 6;
@@ -52,12 +54,12 @@ export class Recording {
   readonly #parts: Parts;
   readonly #chunks: PartCache<FrameColumns[]>;
   readonly #agentMetrics: PartCache<Float32Array>;
+  readonly #tables: PartCache<ReplayTablesPart>;
   readonly #inspections: PartCache<Map<string, ReplayInspection>>;
   /** The number of the first frame of each chunk. */
   readonly #firsts: number[] = [];
   /** Digests of all frames; none of a run that is shown alone. */
   #digests: Uint8Array | null = null;
-  #tables: Promise<BodyTable[]> | null = null;
   #events: Promise<RunEvent[]> | null = null;
   #metrics: Promise<Metrics> | null = null;
 
@@ -76,6 +78,7 @@ export class Recording {
     this.#agentMetrics = new PartCache(async (part) =>
       decodePlane(new ByteReader(await parts.bytes(part)), agents?.agents ?? 0, agents?.cycles.length ?? 0),
     );
+    this.#tables = new PartCache((part) => parts.json<ReplayTablesPart>(part));
     this.#inspections = new PartCache(async (part) => byKey(await parts.json<ReplayInspection[]>(part)));
   }
 
@@ -130,8 +133,12 @@ export class Recording {
 
   /** The body table with a number. */
   async table(id: number): Promise<BodyTable> {
-    this.#tables ??= this.#parts.json<BodyTable[]>(this.run.tables);
-    return (await this.#tables)[id - 1]!;
+    let index = id - 1;
+    for (const { part, tables } of this.run.tables) {
+      if (index < tables) return selectTable(await this.#tables.get(part), index, id);
+      index -= tables;
+    }
+    throw new Error(`there is no body table ${id}: the file is not whole`);
   }
 
   /** The reply to the request for the scenario. */
@@ -158,14 +165,18 @@ export class Recording {
     const entries = wanted.slice(skip, skip + limit);
     const rest = Math.max(0, wanted.length - skip - entries.length);
     const known_until = this.run.status.cycles_planned + 1;
-    return { is: "events", entries, left_out: rest + this.run.events_left_out, known_until };
+    const lost = this.run.events_lost.filter(([cycle]) => from <= cycle && cycle < until);
+    const left_out = lost.reduce((sum, [, count]) => sum + count, rest);
+    return { is: "events", entries, left_out, known_until };
   }
 
   /** The reply to a search for events. */
   async findEvents(query: EventQuery): Promise<ReplyBody> {
     this.#events ??= this.#readEvents();
-    this.#tables ??= this.#parts.json<BodyTable[]>(this.run.tables);
-    return findEvents(await this.#events, query, bodyNames(await this.#tables), this.run.events_left_out);
+    // The bodies of each part of the tables are those of all its tables.
+    const parts = await Promise.all(this.run.tables.map(({ part }) => this.#tables.get(part)));
+    const names = bodyNames(parts.map(({ all }) => all));
+    return findEvents(await this.#events, query, names, this.run.events_left_out);
   }
 
   /**

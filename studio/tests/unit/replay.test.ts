@@ -1,6 +1,6 @@
 /** Replays in one file: planes and frames are read as they were written, and the socket answers as a server does. */
 
-import { deflateRawSync } from "node:zlib";
+import { deflateRawSync, inflateRawSync } from "node:zlib";
 import { expect, test, vi } from "vitest";
 import { decodeFrame } from "../../src/decode";
 import {
@@ -8,12 +8,14 @@ import {
   type BodyTable,
   type ReplayFile,
   type ReplayInspection,
+  type ReplayTablesPart,
   type SessionStatus,
 } from "../../src/protocol";
 import { decodeChunk, frameBytes } from "../../src/replay/chunk";
 import { formatLink, parseLink } from "../../src/replay/link.svelte";
 import { partsOf } from "../../src/replay/parts";
 import { ByteReader, decodePlane } from "../../src/replay/plane";
+import { selectTable } from "../../src/replay/tables";
 import { ReplaySocket } from "../../src/replay/socket";
 import { Studio } from "../../src/state/studio.svelte";
 
@@ -162,7 +164,7 @@ function replayText(): string {
         digest: "abc",
         digests: null,
         cycles: [[0, 10, 4]],
-        tables: 1,
+        tables: [{ part: 1, tables: 1 }],
         source: 2,
         metrics: 3,
         agents: {
@@ -174,13 +176,18 @@ function replayText(): string {
         chunks: [{ part: 4, frames: 4 }],
         events: [{ part: 5, from: 3, until: 23, count: 3 }],
         events_left_out: 4,
+        events_lost: [
+          [2, 1],
+          [20, 3],
+        ],
         inspections: [{ part: 6, from: 20, until: 20, count: 1 }],
         inspected: "robot 3 in cycles 20 to 20",
       },
     ],
   };
   const source = { is: "source", place: "scenario.toml", text: "a = 1", read_only: true };
-  const parts = [file, [table], source, metrics, chunk(4), events, inspections, agentPlane()];
+  const tables = { all: table, changes: [[0, 1]] };
+  const parts = [file, tables, source, metrics, chunk(4), events, inspections, agentPlane()];
   const packed = parts.map((part) => (part instanceof Uint8Array ? part : Buffer.from(JSON.stringify(part))));
   return packed.map((part) => deflateRawSync(part).toString("base64")).join("\n");
 }
@@ -208,6 +215,35 @@ async function opened(): Promise<Studio> {
   await vi.waitUntil(() => studio.active?.frames.newest);
   return studio;
 }
+
+test("a body table is the bodies that came and have not gone", () => {
+  const { all } = JSON.parse(
+    inflateRawSync(Buffer.from(replayText().split("\n")[1]!, "base64")).toString(),
+  ) as ReplayTablesPart;
+  const three: BodyTable = {
+    ...all,
+    kind: [0, 0, 1],
+    number: [3, 8, 0],
+    part: [-1, -1, -1],
+    shape: [0, 0, 1],
+    appearance: [0, 0, 0],
+    names: [
+      [1, "AB8"],
+      [2, "rope"],
+    ],
+    is_agent: [true, true, false],
+  };
+  const part = { all: three, changes: [[0, 2], [1], [0], [1, 2]] };
+  expect(selectTable(part, 0, 5)).toMatchObject({ id: 5, number: [3, 0], kind: [0, 1], names: [[1, "rope"]] });
+  expect(selectTable(part, 1, 6).names).toEqual(three.names);
+  expect(selectTable(part, 2, 7)).toMatchObject({ number: [8, 0], is_agent: [true, false] });
+  expect(selectTable(part, 2, 7).names).toEqual([
+    [0, "AB8"],
+    [1, "rope"],
+  ]);
+  expect(selectTable(part, 3, 8).number).toEqual([]);
+  expect(() => selectTable(part, 4, 9)).toThrow("not whole");
+});
 
 test("a replay opens by itself and goes to recorded cycles alone", async () => {
   const studio = await opened();
@@ -255,7 +291,8 @@ test("playing reaches the end, and pausing stays where it is", async () => {
 test("events, metrics, text and inspections are those of the file", async () => {
   const session = (await opened()).active!;
   const events = await session.client.request({ do: "events", from: 3, until: 31, skip: 1, limit: 1 });
-  expect(events).toMatchObject({ is: "events", left_out: 5, known_until: 31 });
+  // One of the window, and three that are lost in it; another one was lost before.
+  expect(events).toMatchObject({ is: "events", left_out: 4, known_until: 31 });
   if (events.is === "events") expect(events.entries).toMatchObject([{ cycle: 3, value: 2, unit: "m", body: null }]);
   const later = await session.client.request({ do: "events", from: 4, until: 31, skip: null, limit: 9 });
   if (later.is === "events") expect(later.entries).toMatchObject([{ cycle: 23, kind: "contact" }]);

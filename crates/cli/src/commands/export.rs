@@ -1,4 +1,6 @@
-//! `sidestep export`: converts a recorded run to formats of other programs.
+//! `sidestep export`: converts a recorded run, or the runs of a sweep, to formats of other programs.
+
+mod gallery;
 
 use crate::console::{Console, group_thousands};
 use crate::console_watcher::ConsoleWatcher;
@@ -13,7 +15,10 @@ use sidestep::kernel::view::AgentNumber;
 use sidestep::kernel::{Cycle, InputError};
 use sidestep_draw::PictureView;
 use sidestep_record::origins_text;
-use sidestep_server::replay_page::{InspectionRequest, PageRequest, PageResult, export_page};
+use sidestep_server::replay_page::{
+    InspectionRequest, PageContent, PageRequest, PageResult, export_page,
+};
+use sidestep_server::sweep_gallery::{RunChoice, find_sweep};
 use sidestep_session::export::{
     self, AnimationOptions, CycleWindow, ExportRequest, ExportResult, ExportScope, Format,
 };
@@ -30,6 +35,7 @@ Examples:
   sidestep export runs/office --to png --agents 1,4,8 --cycles 200:400 --size 1200x800
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
   sidestep export runs/office --to page --agents 1  one file for any browser
+  sidestep export sweeps/methods --to page          its runs, each with a replay
 
 Tables are copied from the run folder; those of a flight in real time come with a file that says \
 which cycles were flown and which simulated. Everything else is computed again from the recorded \
@@ -102,11 +108,11 @@ impl ExportFormat {
     }
 }
 
-/// Export a recorded run as tables, pictures, animations or recordings for viewers.
+/// Export a recorded run as tables, pictures, animations or recordings for viewers, or the runs of a sweep as pages.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ExportArgs {
-    /// Run folder, or MCAP file
+    /// Run folder, or MCAP file; for pages also the folder of a sweep
     #[arg(value_name = "DIR|FILE")]
     recorded: PathBuf,
 
@@ -163,6 +169,11 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "A:B")]
     cycles: Option<CycleWindow>,
 
+    /// Runs of a sweep that get a replay: all, outliers, or a number of them, first one of each variant,
+    /// then outliers (page) [default: 24]
+    #[arg(long, value_name = "WHICH")]
+    runs: Option<RunChoice>,
+
     /// Another recorded run, shown beside it, with their first difference (page)
     #[arg(long, value_name = "DIR|FILE")]
     beside: Option<PathBuf>,
@@ -179,6 +190,9 @@ pub(crate) struct ExportArgs {
 /// When the recorded run or an option is wrong, or the result cannot be stored or differs from
 /// the recording.
 pub(crate) fn export(args: &ExportArgs, console: Console) -> Result<ExitCode, Failure> {
+    if let Some(folder) = find_sweep(&args.recorded)? {
+        return gallery::export_sweep(args, &folder, console);
+    }
     check_options(args)?;
     let recorded = RecordedRun::open(worlds(), &args.recorded)?;
     let beside = args.beside.as_ref().map(|path| RecordedRun::open(worlds(), path)).transpose()?;
@@ -213,13 +227,6 @@ struct Exported {
     page: Option<PageContent>,
 }
 
-struct PageContent {
-    frames: u64,
-    every: Cycle,
-    inspections: usize,
-    events_left_out: u64,
-}
-
 impl From<ExportResult> for Exported {
     fn from(written: ExportResult) -> Self {
         Self { written, page: None }
@@ -228,38 +235,36 @@ impl From<ExportResult> for Exported {
 
 impl From<PageResult> for Exported {
     fn from(result: PageResult) -> Self {
-        let PageResult { written, frames, every, inspections, events_left_out } = result;
-        Self { written, page: Some(PageContent { frames, every, inspections, events_left_out }) }
+        let PageResult { written, content } = result;
+        Self { written, page: Some(content) }
     }
 }
 
-impl PageContent {
-    fn json(&self) -> Value {
-        json!({
-            "frames": self.frames,
-            "every": self.every,
-            "inspections": self.inspections,
-            "events_left_out": self.events_left_out,
-        })
-    }
+fn page_json(page: &PageContent) -> Value {
+    json!({
+        "frames": page.frames,
+        "every": page.every,
+        "inspections": page.inspections,
+        "events_left_out": page.events_left_out,
+    })
+}
 
-    /// Returns what the page holds, and what it does not.
-    fn text(&self) -> String {
-        let frames = group_thousands(self.frames);
-        let every = match self.every {
-            1 => "one for each cycle".to_string(),
-            every => format!("one every {} cycles", group_thousands(every)),
-        };
-        let inspections = match self.inspections {
-            0 => "no inspections: --agents and --cycles choose some".to_string(),
-            count => format!("{} inspections", group_thousands(count as u64)),
-        };
-        let lost = match self.events_left_out {
-            0 => String::new(),
-            count => format!("  {} events are not in it: too many\n", group_thousands(count)),
-        };
-        format!("  {frames} frames, {every}; {inspections}\n{lost}")
-    }
+/// Returns what the page holds, and what it does not.
+fn page_text(page: &PageContent) -> String {
+    let frames = group_thousands(page.frames);
+    let every = match page.every {
+        1 => "one for each cycle".to_string(),
+        every => format!("one every {} cycles", group_thousands(every)),
+    };
+    let inspections = match page.inspections {
+        0 => "no inspections: --agents and --cycles choose some".to_string(),
+        count => format!("{} inspections", group_thousands(count as u64)),
+    };
+    let lost = match page.events_left_out {
+        0 => String::new(),
+        count => format!("  {} events are not in it: too many\n", group_thousands(count)),
+    };
+    format!("  {frames} frames, {every}; {inspections}\n{lost}")
 }
 
 /// Returns what a user has to know of a run that did not reach its end.
@@ -334,6 +339,10 @@ fn page_request<'a>(args: &'a ExportArgs, beside: Option<&'a RecordedRun>) -> Pa
 /// Refuses options that have no effect on the chosen format.
 fn check_options(args: &ExportArgs) -> Result<(), InputError> {
     let format = args.to;
+    if args.runs.is_some() {
+        let remedy = "leave it out, or give the folder of a sweep";
+        return Err(InputError::new("--runs", "means nothing for a single run", remedy));
+    }
     let is_seen = format.is_picture() || format.is_animation();
     let is_page = format == ExportFormat::Page;
     let given = [
@@ -397,7 +406,7 @@ fn print_result(
     let mut json =
         json!({ "written": shown, "digest_confirmed": is_confirmed, "origins": origins });
     if let Some(page) = page {
-        json["page"] = page.json();
+        json["page"] = page_json(page);
     }
     let names = paths.iter().map(|path| format!("{}\n", path.display())).collect::<String>();
     console.print_result_or_short(&json, &names, || {
@@ -409,7 +418,7 @@ fn print_result(
         let animation = animation.map_or(String::new(), |(pictures, fps)| {
             animation_text(format, pictures, fps, &paths[0])
         });
-        let page = page.as_ref().map_or(String::new(), PageContent::text);
+        let page = page.as_ref().map_or(String::new(), page_text);
         let origins = if recorded.is_flight {
             format!("  {}\n", origins_text(origins))
         } else {

@@ -4,18 +4,23 @@ use crate::console::Console;
 use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
 use crate::fonts::find_fonts;
+use crate::interrupt;
 use crate::report_files::{PngOutput, ReportFiles};
 use crate::size::parse_sides;
 use crate::worlds;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use sidestep::kernel::InputError;
+use sidestep::kernel::workers::available_workers;
 use sidestep_document::Document;
 use sidestep_draw::{DrawError, Fonts, MAX_PNG_PX, to_pdf, to_png_with_density};
 use sidestep_record::FileSet;
 use sidestep_report::{FigureLook, PrintFigure, PrintStyle};
-use sidestep_session::display_path;
+use sidestep_server::replay_page::{InspectionRequest, PageRequest, page_document};
+use sidestep_server::sweep_gallery::{GalleryRequest, RunChoice, find_sweep, write_gallery};
+use sidestep_session::export::ExportScope;
 use sidestep_session::report::{document, track_figure};
+use sidestep_session::{RecordedRun, display_path};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -24,6 +29,7 @@ Examples:
   sidestep report runs/office --out office.html
   sidestep report sweeps/methods        intervals, comparisons, figures
   sidestep report sweeps/methods --figure pdf --figure-data
+  sidestep report runs/office --page    with its replay, which events open
 
 The page is one file that needs no network. A run that is not complete can be reported too; its \
 report says so.
@@ -43,6 +49,11 @@ pub(crate) struct ReportArgs {
     /// Output file; the Markdown version is written beside it [default: DIR/report.html]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+
+    /// Also write the replay as a page beside the report, which leads to it: of a run NAME-replay.html,
+    /// of a sweep the folder NAME-replays, as `sidestep export --to page` makes them
+    #[arg(long)]
+    page: bool,
 
     #[command(flatten)]
     print: PrintArgs,
@@ -131,12 +142,17 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
     // Wrong options are refused before a large folder is read.
     let mut figures = args.print.figures()?;
     files.begin()?;
-    let document = document(worlds(), &args.folder, &ConsoleWatcher::new(console))?;
+    let watcher = ConsoleWatcher::new(console);
+    let mut document = document(worlds(), &args.folder, &watcher)?;
     if let Some(print) = &mut figures {
         split_at_known_labels(&mut print.style.labels, &document);
         check_labels(&print.style, &document)?;
     }
     let mut listed = files.begin()?;
+    if args.page {
+        interrupt::listen()?;
+        document.replay = Some(add_replay(args, &files, &mut listed, &watcher)?);
+    }
     let figures = match figures {
         Some(print) => {
             let tracks = tracks(args, &print, console)?;
@@ -149,14 +165,53 @@ pub(crate) fn report(args: &ReportArgs, console: Console) -> Result<ExitCode, Fa
     let html = files.html.display();
     let markdown = files.markdown();
     let figures = figures.as_ref().map(|folder| folder.display().to_string());
+    let beside = |name: &String| files.html.with_file_name(name).display().to_string();
+    let replay = document.replay.as_ref().map(beside);
     let json = json!({
         "html": html.to_string(),
         "markdown": markdown.display().to_string(),
         "figures": figures,
+        "replay": replay,
     });
-    let more = figures.map_or(String::new(), |folder| format!("{folder}\n"));
+    let more = [replay, figures].into_iter().flatten().map(|path| format!("{path}\n"));
+    let more: String = more.collect();
     console.print_result(&json, || format!("{html}\n{}\n{more}", markdown.display()))?;
     Ok(ExitCode::Done)
+}
+
+/// Adds the replay of a run, or those of a sweep, beside the report; returns the name of the page that shows it.
+///
+/// # Errors
+/// When it cannot be made or written; [`Failure::Interrupted`] when the user stopped it.
+fn add_replay(
+    args: &ReportArgs,
+    files: &ReportFiles,
+    listed: &mut FileSet,
+    watcher: &ConsoleWatcher,
+) -> Result<String, Failure> {
+    let scope = ExportScope {
+        out: None,
+        replace: false,
+        from: None,
+        until: None,
+        every: None,
+        workers: available_workers(),
+    };
+    let inspections = InspectionRequest::default();
+    if let Some(sweep) = find_sweep(&args.folder)? {
+        let folder = format!("{}-replays", files.stem());
+        let request = GalleryRequest { scope, inspections, runs: RunChoice::default() };
+        let mut store =
+            |name: &str, bytes: &[u8]| listed.stage_bytes(&format!("{folder}/{name}"), bytes);
+        write_gallery(worlds(), &sweep, &request, &mut store, watcher)?;
+        return Ok(format!("{folder}/index.html"));
+    }
+    let recorded = RecordedRun::open(worlds(), &args.folder)?;
+    let request = PageRequest { scope, inspections, beside: None };
+    let (page, _) = page_document(worlds(), &recorded, &request, watcher)?;
+    let name = format!("{}-replay.html", files.stem());
+    listed.stage_bytes::<Failure>(&name, page.as_bytes())?;
+    Ok(name)
 }
 
 impl PrintArgs {

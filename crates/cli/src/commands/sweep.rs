@@ -33,9 +33,10 @@ On a cluster (docs/src/clusters.md has a Slurm array and a Kubernetes job):
   sidestep sweep collect sweeps/methods
 
 A sweep file is TOML: format = 1, scenario = \"FILE\", replicates, [set], [vary], [[variant]], \
-[latin_hypercube], [until], metrics, baseline; scenarios/sweeps/ has commented ones. Replicate k of \
+[latin_hypercube], [until], metrics, baseline, series; scenarios/sweeps/ has commented ones. Replicate k of \
 every variant has the same seed. DIR/results.parquet has one row per run. The same command again \
-continues where a killed one stopped, as does `sidestep resume DIR`; no finished run is repeated.";
+continues where a killed one stopped, as does `sidestep resume DIR`; no finished run is repeated. \
+`sidestep export DIR --to page` makes pages of its runs, and `sidestep report DIR` a report.";
 
 /// Run a parameter sweep: many variants of a scenario, each with many seeds.
 #[derive(Debug, Args)]

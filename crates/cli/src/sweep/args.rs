@@ -38,6 +38,11 @@ pub(crate) struct ReplicationArgs {
     #[arg(long, value_name = "KEY=V")]
     pub(crate) baseline: Vec<String>,
 
+    /// Metrics that runs keep over time, for means over seeds; `none` for no metric [default: those
+    /// that the world is about]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub(crate) series: Vec<String>,
+
     /// Record every run in a folder of its own, in DIR/runs
     #[arg(long)]
     pub(crate) record_runs: bool,
@@ -56,6 +61,7 @@ impl ReplicationArgs {
         let given = [
             (!self.metrics.is_empty(), "--metrics"),
             (!self.baseline.is_empty(), "--baseline"),
+            (!self.series.is_empty(), "--series"),
             (self.record_runs, "--record-runs"),
             (self.max.is_some(), "--max"),
         ];
@@ -84,6 +90,7 @@ impl ReplicationArgs {
             baseline,
             first_seed: changes.seed,
             record: self.record_runs,
+            series: parse_series(&self.series),
         })
     }
 }
@@ -97,6 +104,15 @@ fn parse_baseline(texts: &[String]) -> Result<BaselineSpec, InputError> {
         return Err(InputError::new("--baseline", cause, "give one name, or values as KEY=V"));
     }
     Ok(BaselineSpec { name: names.into_iter().next(), settings: parse_settings(&values)? })
+}
+
+/// Returns the metrics to keep over time; none where the option is not given.
+fn parse_series(names: &[String]) -> Option<Vec<String>> {
+    match names {
+        [] => None,
+        [none] if none == "none" => Some(Vec::new()),
+        names => Some(names.to_vec()),
+    }
 }
 
 fn parse_settings(texts: &[String]) -> Result<Vec<Setting>, InputError> {

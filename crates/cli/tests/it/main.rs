@@ -16,6 +16,7 @@ mod fk;
 mod fleet;
 mod flips;
 mod foxglove;
+mod gallery;
 mod gridlock;
 mod help;
 mod hints;

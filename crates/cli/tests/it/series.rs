@@ -145,3 +145,53 @@ fn metrics_over_time_are_exported_verified_and_computed_again_as_other_tables_ar
     std::fs::copy(other.path(part), place.path(part)).expect("copied");
     assert_ne!(place.run(&["verify", "r"]).code(), 0);
 }
+
+#[test]
+fn sweeps_keep_the_metrics_that_they_are_told_and_print_their_means_over_seeds() {
+    let place = TestFolder::new();
+    let sweep = ["sweep", "s.toml", "--cycles", "40", "--replicate", "3"];
+    let bands = |more: &[&str]| place.json(&[&sweep[..], more].concat())["bands"].clone();
+    let by_default = bands(&[]);
+    assert!(by_default.as_array().is_some_and(|all| all.len() > 1), "{by_default}");
+    let told = bands(&["--series", "contacts,distance_m"]);
+    let metrics: Vec<&Value> =
+        told.as_array().expect("bands").iter().map(|b| &b["metric"]).collect();
+    assert_eq!(metrics, ["contacts", "distance_m"]);
+    let distance = &told[1];
+    let last = |field: &str| distance[field].as_array().and_then(|all| all.last()).cloned();
+    assert_eq!((last("cycle"), last("runs")), (Some(json!(40)), Some(json!(3))));
+    let runs = (5..8).map(|seed: u32| {
+        let seed = seed.to_string();
+        let run = place.json(&["run", "s.toml", "--cycles", "40", "--seed", &seed]);
+        run["metrics"]["distance_m"].as_f64().expect("a number")
+    });
+    let mean = runs.sum::<f64>() / 3.0;
+    assert!((last("mean").and_then(|mean| mean.as_f64()).expect("a mean") - mean).abs() < 1e-9);
+    let bound = |field: &str| last(field).and_then(|bound| bound.as_f64()).expect("a bound");
+    assert!(bound("mean_low") <= mean && mean <= bound("mean_high"));
+    assert_eq!(bands(&["--series", "none"]), json!([]));
+}
+
+#[test]
+fn a_sweep_file_says_which_metrics_are_kept_and_an_unknown_one_is_refused_before_any_run() {
+    let place = TestFolder::new();
+    let file = |series: &str| {
+        format!("format = 1\nscenario = \"s.toml\"\nreplicates = 2\n{series}\n[set]\ncycles = 30\n")
+    };
+    place.write("w.toml", file("series = [\"contacts\"]"));
+    place.json(&["sweep", "w.toml", "--out", "w"]);
+    let path = place.path("w/series.parquet");
+    assert!(path.is_file());
+    let told = place.json(&["sweep", "w.toml"]);
+    assert_eq!(told["bands"].as_array().map(Vec::len), Some(1), "{}", told["bands"]);
+    place.write("none.toml", file("series = []"));
+    place.json(&["sweep", "none.toml", "--out", "none"]);
+    assert!(!place.path("none/series.parquet").exists());
+    place.write("wrong.toml", file("series = [\"contact\"]"));
+    let refused = place.run(&["sweep", "wrong.toml", "--out", "wrong"]);
+    assert_eq!((refused.code(), place.path("wrong").exists()), (2, false));
+    assert!(refused.err().contains("`contact` is no metric"), "{}", refused.err());
+    assert!(refused.err().contains("contacts"), "the right one is named: {}", refused.err());
+    let refused = place.run(&["run", "s.toml", "--series", "contacts"]);
+    assert!(refused.err().contains("it is about many runs"), "{}", refused.err());
+}

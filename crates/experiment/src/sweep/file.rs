@@ -51,6 +51,8 @@ pub struct Sweep {
     pub baseline: BaselineSpec,
     /// Whether every run is recorded in a folder of its own.
     pub record: bool,
+    /// The metrics that runs keep over time; none for those that their world is about.
+    pub series: Option<Vec<String>>,
 }
 
 /// Number of metrics that a front has.
@@ -145,6 +147,9 @@ struct SweepFile {
     /// Whether every run is recorded in a folder of its own.
     #[serde(default)]
     record: bool,
+    /// Metrics that runs keep over time, for bands over their seeds; those that the world is about if it is not given,
+    /// none for an empty list.
+    series: Option<Vec<String>>,
 }
 
 /// A table of keys of a scenario, dotted or nested.
@@ -226,6 +231,7 @@ impl Sweep {
             better: Vec::new(),
             baseline: BaselineSpec::default(),
             record: false,
+            series: None,
         }
     }
 
@@ -293,6 +299,7 @@ impl Sweep {
             baseline,
             name: file.name,
             record: file.record,
+            series: file.series,
         })
     }
 

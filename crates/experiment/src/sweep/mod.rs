@@ -16,6 +16,7 @@
 //! column_schema.rs  the columns of that table, for writing it block by block
 //!
 //! table.rs     a table of runs: one row per run, typed columns with a role
+//! outliers.rs  runs that lie far from the others of their variant
 //! label.rs     the label of a column on an axis, with its unit
 //! groups.rs    runs by variant and replicate, and the mean over any group of variants
 //! compare.rs   a variant against the baseline, on the same replicates
@@ -48,6 +49,7 @@ mod groups;
 pub mod label;
 mod lead_charts;
 mod options;
+pub mod outliers;
 mod overrides;
 pub mod plan;
 mod plan_summary;

@@ -27,6 +27,8 @@ pub struct SweepOverrides {
     pub first_seed: Option<u64>,
     /// Whether every run is recorded, even if the file does not say so.
     pub record: bool,
+    /// The metrics that runs keep over time, instead of the file's.
+    pub series: Option<Vec<String>>,
 }
 
 impl Sweep {
@@ -66,6 +68,7 @@ impl Sweep {
         self.baseline = changes.baseline.unwrap_or(self.baseline);
         self.first_seed = changes.first_seed.or(self.first_seed);
         self.record |= changes.record;
+        self.series = changes.series.or(self.series);
         self.check()?;
         Ok(self)
     }

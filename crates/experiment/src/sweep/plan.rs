@@ -47,6 +47,9 @@ pub struct Plan {
     pub agents: u64,
     /// Whether every run is recorded in a folder of its own.
     pub record: bool,
+    /// The metrics that its runs keep over time; none for those that their world is about.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series: Option<Vec<String>>,
 }
 
 /// Largest number of runs of a sweep: joining a table of ten million takes some gigabytes.
@@ -120,6 +123,7 @@ impl Plan {
             baseline: None,
             agents: 0,
             record: sweep.record,
+            series: sweep.series.clone(),
         };
         plan.baseline = plan.baseline_of(sweep, base)?;
         Ok(plan)

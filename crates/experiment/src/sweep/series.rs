@@ -20,16 +20,12 @@ const ROWS: Cycle = 100;
 pub const CYCLE: &str = "cycle";
 
 /// The metrics over time that a trial keeps.
-#[derive(Debug, Clone, Copy)]
-pub struct TrialSeries(&'static [&'static str]);
+#[derive(Debug, Clone)]
+pub struct TrialSeries(Vec<String>);
 
 impl TrialSeries {
     /// Starts to keep these metrics of a simulation that is at its start and runs until a cycle.
-    pub fn start(
-        simulation: &mut dyn Simulation,
-        until: Cycle,
-        metrics: &'static [&'static str],
-    ) -> Self {
+    pub fn start(simulation: &mut dyn Simulation, until: Cycle, metrics: Vec<String>) -> Self {
         if !metrics.is_empty() {
             simulation.start_series(SeriesInterval::with_rows(until, ROWS));
         }
@@ -48,10 +44,10 @@ impl TrialSeries {
         fields.insert(CYCLE.into(), cycles.join(",").into());
         let names: Vec<&str> =
             simulation.series_columns().iter().map(|column| column.name.as_str()).collect();
-        for metric in self.0 {
+        for metric in &self.0 {
             let Some(at) = names.iter().position(|name| name == metric) else { continue };
             let values: Vec<String> = rows.columns[at].iter().map(|value| cell(*value)).collect();
-            fields.insert((*metric).into(), values.join(",").into());
+            fields.insert(metric.clone(), values.join(",").into());
         }
         fields
     }
@@ -329,5 +325,19 @@ mod tests {
         let last = arrived.rsplit(',').next().expect("a number");
         assert_eq!(last, outcome.metrics["arrived"].to_string());
         assert_eq!(outcome.series, kept(2).series);
+    }
+
+    #[test]
+    fn a_trial_keeps_the_metrics_that_it_is_told_and_nothing_without_any() {
+        let source = Source::new("s.toml", AIRSPACE, "");
+        let kept = |names: &[&str]| {
+            let trial = Trial { id: 0, variant: 0, replicate: 0, seed: 1 };
+            let started = start_trial(&worlds(), trial, &source, 1).expect("valid");
+            let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+            started.with_series(names).run(&|| true).expect("not stopped").series
+        };
+        let series = kept(&["in_flight"]);
+        assert_eq!(series.keys().collect::<Vec<_>>(), [CYCLE, "in_flight"]);
+        assert!(kept(&[]).is_empty());
     }
 }

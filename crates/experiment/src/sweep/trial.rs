@@ -39,7 +39,8 @@ pub struct TrialRun {
     trial: Trial,
     simulation: Box<dyn Simulation>,
     until: Cycle,
-    series: TrialSeries,
+    /// The metrics that are kept over time.
+    series: Vec<String>,
 }
 
 /// Returns the simulation of a trial of the variant `source`, of one of `worlds`, at its start.
@@ -55,15 +56,18 @@ pub fn start_trial(
     let source = source.clone().with_overrides(&[format!("seed={}", trial.seed)])?;
     let compiled = worlds.compile(&source)?;
     let until = compiled.plan().cycles;
-    let mut simulation = compiled.start(&source, workers);
-    let metrics = chart_metrics(worlds, compiled.world());
-    let series = TrialSeries::start(simulation.as_mut(), until, metrics);
+    let simulation = compiled.start(&source, workers);
+    let series = series_metrics(worlds, compiled.world(), None);
     Ok(TrialRun { trial, simulation, until, series })
 }
 
-/// Returns the metrics that a world is about.
-pub fn chart_metrics(worlds: &Worlds, world: &str) -> &'static [&'static str] {
-    worlds.find(world).map_or(&[], |world_type| world_type.chart_metrics())
+/// Returns the metrics that a trial keeps over time: the requested ones, or those that its world is about.
+pub fn series_metrics(worlds: &Worlds, world: &str, requested: Option<&[String]>) -> Vec<String> {
+    if let Some(requested) = requested {
+        return requested.to_vec();
+    }
+    let of_world = worlds.find(world).map_or(&[][..], |world_type| world_type.chart_metrics());
+    of_world.iter().map(ToString::to_string).collect()
 }
 
 /// Returns the names of the metrics that runs of a scenario have, in order.
@@ -81,16 +85,23 @@ impl TrialRun {
         self
     }
 
+    /// Returns the same simulation, of which these metrics are kept over time.
+    #[must_use]
+    pub fn with_series(self, series: Vec<String>) -> Self {
+        Self { series, ..self }
+    }
+
     /// Runs to the end; returns `None` as soon as `should_continue` returns false.
     pub fn run(mut self, should_continue: &dyn Fn() -> bool) -> Option<Outcome> {
         let simulation = self.simulation.as_mut();
+        let series = TrialSeries::start(simulation, self.until, self.series);
         while simulation.cycle() < self.until && !simulation.is_over() {
             if !should_continue() {
                 return None;
             }
             simulation.advance(INTERRUPT_CHECK_CYCLES.min(self.until - simulation.cycle()));
         }
-        let series = self.series.take(simulation);
+        let series = series.take(simulation);
         Some(Outcome { series, ..Outcome::from_simulation(self.trial, simulation) })
     }
 }

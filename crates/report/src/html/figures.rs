@@ -46,7 +46,7 @@ fn chart(figure: &Figure, drawn: &PagePicture, id: &str) -> Markup {
         @if let Some(numbers) = numbers_table(figure) {
             details .numbers {
                 summary { "Numbers" }
-                (tables::wide_table(&format!("numbers of {}", figure.title), tables::grid(&numbers, None)))
+                (tables::wide_table(&format!("numbers of {}", figure.title), tables::grid(&numbers, None, None)))
             }
         }
     }
@@ -86,11 +86,15 @@ fn inline_svg(svg: &str, alt: &str, id: &str) -> Markup {
     html! { (PreEscaped(drawing.replace(">\n", ">"))) }
 }
 
-pub(super) fn picture(picture: &Picture, id: &str) -> Markup {
+pub(super) fn picture(picture: &Picture, id: &str, replay: Option<&str>) -> Markup {
+    let drawing = image(&picture.svg, &format!("{}. {}", picture.title, picture.caption));
     html! {
         figure .picture id=(id) {
             figcaption { (picture.title) }
-            (image(&picture.svg, &format!("{}. {}", picture.title, picture.caption)))
+            @match replay {
+                Some(replay) => a href=(replay) { (drawing) },
+                None => (drawing),
+            }
             @if !picture.caption.is_empty() { p .note { (picture.caption) } }
         }
     }
@@ -139,7 +143,7 @@ fn format_short(value: f64) -> String {
 }
 
 /// Returns JSON for a script: no text in it can end the script.
-fn safe_json(value: &serde_json::Value) -> String {
+pub(crate) fn safe_json(value: &serde_json::Value) -> String {
     value.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028")
 }
 

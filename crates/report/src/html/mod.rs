@@ -10,22 +10,28 @@ mod blocks;
 mod figures;
 mod tables;
 
+pub(crate) use figures::safe_json;
+pub(crate) use tables::wide_table;
+
 use crate::{PagePicture, slug};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use sidestep_document::Document;
 use sidestep_document::document::{Block, Span, Text};
 
-const STYLE: &str = include_str!("page.css");
-const SCRIPT: &str = include_str!("page.js");
+pub(crate) const STYLE: &str = include_str!("page.css");
+pub(crate) const SCRIPT: &str = include_str!("page.js");
 /// The script that shows the values of marks; a page without figures does not contain it.
 const HOVER_SCRIPT: &str = include_str!("hover.js");
 
 /// Security policy: nothing may be loaded; inline styles and scripts may be used.
-const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
+pub(crate) const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
                       img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'";
 
 /// A hint on how to use figures with a mouse.
 const HINT: &str = "Figures: point at a mark for its values.";
+
+/// The words of the link to a replay.
+pub(crate) const REPLAY_WORDS: &str = "Open the replay";
 
 /// Minimum number of sections for a table of contents: fewer are found by scrolling.
 const MIN_CONTENTS_SECTIONS: usize = 3;
@@ -53,6 +59,7 @@ pub(crate) fn page(document: &Document, pictures: &[PagePicture]) -> String {
                 header {
                     h1 { (document.title) }
                     p .lead { (text(&document.lead)) }
+                    @if let Some(replay) = &document.replay { p { a href=(replay) { (REPLAY_WORDS) } } }
                 }
                 @if has_contents { (table_of_contents(&sections)) }
                 main { @for section in &sections { (section.markup()) } }
@@ -81,6 +88,8 @@ struct PageBlock<'a> {
     block: &'a Block,
     id: String,
     picture: Option<&'a PagePicture>,
+    /// The path of the replay beside the report.
+    replay: Option<&'a str>,
 }
 
 impl<'a> PageSection<'a> {
@@ -98,7 +107,8 @@ impl<'a> PageSection<'a> {
             let picture = if has_picture { pictures.next() } else { None };
             let id = anchor_id(title_of(block).unwrap_or("part"), k);
             if let Some(section) = sections.last_mut() {
-                section.blocks.push(PageBlock { block, id, picture });
+                let replay = document.replay.as_deref();
+                section.blocks.push(PageBlock { block, id, picture, replay });
             }
         }
         sections.retain(|s| s.title.is_some() || !s.blocks.is_empty());
@@ -172,7 +182,7 @@ fn table_of_contents(sections: &[PageSection<'_>]) -> Markup {
     }
 }
 
-fn text(text: &Text) -> Markup {
+pub(crate) fn text(text: &Text) -> Markup {
     html! {
         @for span in &text.0 {
             @match span {

@@ -8,7 +8,8 @@ use sidestep_document::document::Text;
 
 /// Returns a table that can be sorted by a click on a heading. Columns without room wait behind a
 /// button; a folded table is shown by a click on its title.
-pub(super) fn table(table: &Table, id: &str) -> Markup {
+/// Rows about a moment of a run lead to its `replay`, where there is one.
+pub(super) fn table(table: &Table, id: &str, replay: Option<&str>) -> Markup {
     let note = html! {
         @if !table.note.is_empty() { p .note { (text(&Text::from_markup(&table.note))) } }
     };
@@ -16,12 +17,12 @@ pub(super) fn table(table: &Table, id: &str) -> Markup {
         @if table.is_folded {
             details .table id=(id) {
                 summary { (table.title) }
-                (wide_table(&table.title, grid(table, None)))
+                (wide_table(&table.title, grid(table, None, replay)))
                 (note)
             }
         } @else {
             div .table id=(id) {
-                (wide_table(&table.title, grid(table, Some(&table.title))))
+                (wide_table(&table.title, grid(table, Some(&table.title), replay)))
                 (note)
             }
         }
@@ -29,7 +30,7 @@ pub(super) fn table(table: &Table, id: &str) -> Markup {
 }
 
 /// Returns columns and rows, with the title as caption.
-pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
+pub(super) fn grid(table: &Table, caption: Option<&str>, replay: Option<&str>) -> Markup {
     let numbers: Vec<bool> =
         (0..table.columns.len()).map(|k| is_numeric_column(table, k)).collect();
     html! {
@@ -41,15 +42,30 @@ pub(super) fn grid(table: &Table, caption: Option<&str>) -> Markup {
                 }
             } }
             tbody {
-                @for row in &table.rows {
+                @for (index, row) in table.rows.iter().enumerate() {
                     tr {
                         @for (k, cell) in table.cells(row).enumerate() {
-                            @if k == 0 { th scope="row" class=[class(numbers[k])] { (breakable_name(cell)) } }
+                            @if k == 0 { th scope="row" class=[class(numbers[k])] { (row_name(cell, moment_address(table, index, replay))) } }
                             @else { td class=[(!numbers[k]).then_some("words")] { (non_breaking(cell)) } }
                         }
                     }
                 }
             }
+        }
+    }
+}
+
+/// Returns the address of the moment that a row is about, in a replay.
+fn moment_address(table: &Table, row: usize, replay: Option<&str>) -> Option<String> {
+    let moment = table.moments.get(row)?;
+    Some(format!("{}#{}", replay?, moment.fragment()))
+}
+
+fn row_name(name: &str, address: Option<String>) -> Markup {
+    html! {
+        @match address {
+            Some(address) => a href=(address) { (breakable_name(name)) },
+            None => (breakable_name(name)),
         }
     }
 }
@@ -85,7 +101,7 @@ fn non_breaking(cell: &str) -> String {
 
 /// Returns the place of a table: the page's script takes the last columns away where they have no room,
 /// and offers them. Without scripts it scrolls, and so it has a name and can be reached by keyboard.
-pub(super) fn wide_table(name: &str, inside: Markup) -> Markup {
+pub(crate) fn wide_table(name: &str, inside: Markup) -> Markup {
     // Not the name alone: a section may have the same.
     html! { div .wide { div .scrolled role="region" tabindex="0" aria-label={ "Table: " (name) } { (inside) } } }
 }

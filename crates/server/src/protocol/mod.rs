@@ -40,7 +40,7 @@ pub use edit::Edit;
 pub use fleet::{Fleet, FleetNode};
 pub use replay::{
     ReplayAgentMetrics, ReplayChunk, ReplayEvents, ReplayFile, ReplayInspection, ReplayRun,
-    ReplaySpan,
+    ReplaySpan, ReplayTables, ReplayTablesPart,
 };
 pub use reply::{
     FileEntry, FileKind, GalleryEntry, MetricName, MetricRow, Problem, Reply, ReplyBody,

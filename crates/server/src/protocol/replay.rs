@@ -3,7 +3,7 @@
 //! The file holds parts: deflated bytes as base64, one in a line. The first part is a [`ReplayFile`] as JSON; it refers
 //! to the others by their numbers. The layout of frames is in `crates/server/src/replay_page/chunk.rs`.
 
-use super::{Scan, Scene, SessionStatus};
+use super::{BodyTable, Scan, Scene, SessionStatus};
 use serde::Serialize;
 use sidestep_kernel::view::Inspection;
 
@@ -35,8 +35,8 @@ pub struct ReplayRun {
     pub digests: Option<u32>,
     /// The cycles of the frames: first cycle, cycles between two frames, number of frames.
     pub cycles: Vec<[f64; 3]>,
-    /// The part with all body tables, in the order of their numbers from 1 on.
-    pub tables: u32,
+    /// The parts with body tables, in the order of their numbers from 1 on.
+    pub tables: Vec<ReplayTables>,
     /// The part with the reply to the request for the scenario.
     pub source: u32,
     /// The part with the reply to the request for all rows of metrics.
@@ -49,6 +49,8 @@ pub struct ReplayRun {
     pub events: Vec<ReplaySpan>,
     /// Number of events that are not in the file.
     pub events_left_out: u64,
+    /// Cycles with such events, and their numbers; cycles near each other are counted together.
+    pub events_lost: Vec<[f64; 2]>,
     /// The parts with inspections, in their order.
     pub inspections: Vec<ReplaySpan>,
     /// What can be inspected, in words.
@@ -77,6 +79,26 @@ pub struct ReplayChunk {
     pub part: u32,
     /// Number of frames.
     pub frames: u32,
+}
+
+/// A part with body tables, see [`ReplayTablesPart`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct ReplayTables {
+    /// Its number.
+    pub part: u32,
+    /// Number of tables.
+    pub tables: u32,
+}
+
+/// Some consecutive body tables: each is a selection of the bodies of all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct ReplayTablesPart {
+    /// The bodies of all tables, in the order that all have. Its session and its number mean nothing.
+    pub all: BodyTable,
+    /// For each table the bodies that come or go with it; before the first one there is none.
+    pub changes: Vec<Vec<u32>>,
 }
 
 /// A part with things of some cycles.

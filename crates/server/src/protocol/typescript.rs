@@ -71,6 +71,8 @@ fn types() -> String {
         ReplayFile,
         ReplayRun,
         ReplayAgentMetrics,
+        ReplayTables,
+        ReplayTablesPart,
         ReplayChunk,
         ReplaySpan,
         ReplayEvents,

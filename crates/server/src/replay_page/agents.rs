@@ -48,6 +48,21 @@ impl InspectionRequest {
         AgentNumber::check_all(&self.agents, &first.bodies)
     }
 
+    /// Refuses a request of which no run of a sweep has anything.
+    ///
+    /// # Errors
+    /// When something was requested.
+    pub(crate) fn refuse_without_any(&self) -> Result<(), InputError> {
+        let numbers: Vec<String> = self.agents.iter().map(ToString::to_string).collect();
+        let place = match (self.cycles, numbers.is_empty()) {
+            (None, true) => return Ok(()),
+            (None, false) => format!("--agents {}", numbers.join(",")),
+            (Some(window), _) => format!("--cycles {}:{}", window.from, window.until),
+        };
+        let cause = "no run with a replay has such agents in such cycles";
+        Err(InputError::new(place, cause, "give others, or leave it out"))
+    }
+
     /// Returns what can be inspected, in words; `noun` is that for an agent.
     pub(super) fn describe(&self, noun: &str) -> String {
         let numbers: Vec<String> = self.agents.iter().map(ToString::to_string).collect();

@@ -1,20 +1,22 @@
 //! Collects all that a replay shows of a run, while the run is computed again.
 
 use super::agent_rows::AgentRows;
+use super::TrialReplay;
 use super::agents::InspectionRequest;
 use super::chunk::ChunkBuilder;
 use super::extent::finest_step_exponent;
 use super::parts::Parts;
+use super::tables::TableParts;
 use crate::encode::{FrameColumns, FrameEncoder, scan, scene};
 use crate::event_store::EventStore;
 use crate::metric_history::MetricHistory;
 use crate::protocol::{
-    BodyTable, FrameText, ReplayChunk, ReplayEvents, ReplayInspection, ReplayRun, ReplaySpan,
-    ReplyBody, RunEvent, SessionState, SessionStatus, Speed,
+    FrameText, ReplayChunk, ReplayEvents, ReplayInspection, ReplayRun, ReplaySpan, ReplyBody,
+    RunEvent, SessionState, SessionStatus, Speed,
 };
 use sidestep_kernel::view::{Body, Frame, FrameOptions, ScanSelection, Scenery};
 use sidestep_kernel::{Cycle, InputError, Simulation};
-use sidestep_session::{Error, FrameSink};
+use sidestep_session::{Error, FrameSink, Thumbnail};
 
 /// Number of events in a part: a browser reads one within a picture.
 const EVENTS_PER_PART: u32 = 5000;
@@ -34,13 +36,15 @@ pub(super) struct ReplayCollector<'a> {
     chunks: Vec<ReplayChunk>,
     /// Runs of evenly spaced cycles of frames: first cycle, cycles between two frames, number of frames.
     cycles: Vec<[Cycle; 3]>,
-    tables: Vec<BodyTable>,
+    tables: TableParts,
     log: EventStore,
     metrics: MetricHistory,
     agents: AgentRows,
     inspections: InspectionParts,
     /// Digests of the states of all frames, if they are kept.
     digests: Vec<u8>,
+    /// The picture of a run of a sweep.
+    thumbnail: Option<Thumbnail>,
 }
 
 /// What a replay holds of each of its runs.
@@ -50,6 +54,8 @@ pub(super) struct ReplayOptions<'a> {
     /// Whether it has the digest of each frame, by which two runs are compared.
     pub(super) has_digests: bool,
     pub(super) inspections: &'a InspectionRequest,
+    /// What it is of a sweep; none for a run of its own.
+    pub(super) trial: Option<TrialReplay<'a>>,
 }
 
 /// What a replay says about itself beside the run.
@@ -80,13 +86,20 @@ impl<'a> ReplayCollector<'a> {
             chunk: None,
             chunks: Vec::new(),
             cycles: Vec::new(),
-            tables: Vec::new(),
+            tables: TableParts::default(),
             log: EventStore::default(),
             metrics,
             agents,
             inspections: InspectionParts::default(),
             digests: Vec::new(),
+            thumbnail: options.trial.map(|_| Thumbnail::new(run)),
         }
+    }
+
+    /// Returns the picture of a run of a sweep at its end, as PNG.
+    pub(super) fn picture(&mut self, run: &mut dyn Simulation) -> Result<Option<Vec<u8>>, Error> {
+        let picture = self.thumbnail.take().zip(self.options.trial);
+        picture.map(|(thumbnail, trial)| thumbnail.png(run, trial.picture_px)).transpose()
     }
 
     /// Returns the number of inspections.
@@ -107,7 +120,9 @@ impl<'a> ReplayCollector<'a> {
         let scene = scene(run.world_name(), run.agent_noun(), &self.scenery, true);
         let place = "scenario.toml".to_string();
         let source = ReplyBody::Source { place, text: origin.scenario, read_only: true };
-        let (events, events_left_out) = self.push_events()?;
+        let events = self.push_events()?;
+        let events_lost = self.log.lost();
+        let events_left_out = events_lost.iter().map(|(_, count)| count).sum();
         self.inspections.flush(self.parts)?;
         let mut digests = None;
         if self.options.has_digests {
@@ -120,13 +135,14 @@ impl<'a> ReplayCollector<'a> {
             digest: origin.digest,
             digests,
             cycles: self.cycles.iter().map(|run| run.map(|n| n as f64)).collect(),
-            tables: self.parts.push_json(&self.tables)?,
+            tables: self.tables.finish(self.parts)?,
             source: self.parts.push_json(&source)?,
             metrics: self.parts.push_json(&self.metrics.metrics_reply(run, 0, false))?,
             agents: self.agents.finish(run, self.parts)?,
             chunks: std::mem::take(&mut self.chunks),
             events,
             events_left_out,
+            events_lost: events_lost.iter().map(|&(cycle, n)| [cycle as f64, n as f64]).collect(),
             inspections: std::mem::take(&mut self.inspections.spans),
             inspected: self.options.inspections.describe(run.agent_noun()),
         })
@@ -163,7 +179,9 @@ impl<'a> ReplayCollector<'a> {
     fn push_frame(&mut self, frame: &Frame) -> Result<(), Error> {
         let text = FrameText { scans: Vec::new(), events: Vec::new(), events_left_out: 0 };
         let (table, bytes) = self.encoder.encode(frame, &text, 0);
-        self.tables.extend(table);
+        if let Some(table) = table {
+            self.tables.push(&table, self.parts)?;
+        }
         let scenery = &self.scenery;
         let chunk = self
             .chunk
@@ -197,15 +215,15 @@ impl<'a> ReplayCollector<'a> {
         Ok(())
     }
 
-    /// Writes all kept events; returns where they are, and the number of those that were not kept.
-    fn push_events(&mut self) -> Result<(Vec<ReplaySpan>, u64), Error> {
+    /// Writes all kept events; returns where they are.
+    fn push_events(&mut self) -> Result<Vec<ReplaySpan>, Error> {
         let mut spans = Vec::new();
         let mut done = 0;
         loop {
             let reply = self.log.events_reply(0..Cycle::MAX, done, EVENTS_PER_PART);
-            let ReplyBody::Events { entries, left_out, .. } = reply else { break };
+            let ReplyBody::Events { entries, .. } = reply else { break };
             let Some((first, last)) = entries.first().zip(entries.last()) else {
-                return Ok((spans, left_out));
+                return Ok(spans);
             };
             let from = first.cycle;
             let until = last.cycle;
@@ -214,7 +232,7 @@ impl<'a> ReplayCollector<'a> {
             spans.push(ReplaySpan { part, from, until, count });
             done += count;
         }
-        Ok((spans, 0))
+        Ok(spans)
     }
 }
 
@@ -234,6 +252,9 @@ impl FrameSink for ReplayCollector<'_> {
         }
         self.add_cycle(cycle);
         self.push_frame(&frame)?;
+        if let Some(thumbnail) = &mut self.thumbnail {
+            thumbnail.add(&frame);
+        }
         if self.options.has_digests {
             self.digests.extend(run.digest().as_bytes());
         }

@@ -6,6 +6,7 @@
 //! agents.rs     which agents are inspected               extent.rs           how exact places have to be
 //! agent_rows.rs metrics of each agent over time
 //! parts.rs      deflated and as base64                   html.rs, start.js   the document
+//! tables.rs     body tables as few bytes
 //! ```
 //! The other side is `studio/src/replay/`: a socket without a server, which answers the page's requests from the parts.
 
@@ -17,6 +18,7 @@ mod extent;
 mod html;
 mod parts;
 mod plane;
+mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -53,6 +55,13 @@ pub struct PageRequest<'a> {
 pub struct PageResult {
     /// The file.
     pub written: ExportResult,
+    /// What is in it.
+    pub content: PageContent,
+}
+
+/// What a replay holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PageContent {
     /// Number of frames.
     pub frames: u64,
     /// Number of cycles between two frames.
@@ -61,6 +70,8 @@ pub struct PageResult {
     pub inspections: usize,
     /// Number of events that are not in it, because there were too many.
     pub events_left_out: u64,
+    /// Whether the ends of all runs have the recorded digests.
+    pub is_confirmed: bool,
 }
 
 /// Exports a recorded run as one page that needs no server.
@@ -74,35 +85,96 @@ pub fn export_page(
     request: &PageRequest<'_>,
     watcher: &dyn Watcher,
 ) -> Result<PageResult, Error> {
-    let files = page::entry_files().ok_or_else(no_page)?;
+    check_has_page()?;
     let mut sources = vec![FrameSource::check(recorded, &request.scope, watcher)?];
     let file = ExportFile::check(&sources[0], ".html")?;
     if let Some(other) = request.beside {
         sources.push(FrameSource::check(other, &request.scope, watcher)?);
     }
-    let content = collect(worlds, request, &sources)?;
-    let document = html::document(&content.title, &files, &content.parts);
+    let ReplayPage { document, content, .. } = render(worlds, &request.spec(), &sources)?;
     let written = file.write(document.as_bytes(), content.is_confirmed)?;
-    let ReplayContent { frames, every, inspections, events_left_out, .. } = content;
-    Ok(PageResult { written, frames, every, inspections, events_left_out })
+    Ok(PageResult { written, content })
+}
+
+/// Returns the page of a recorded run, which the caller stores.
+///
+/// # Errors
+/// Those of [`export_page`] but for the place.
+pub fn page_document(
+    worlds: &Worlds,
+    recorded: &RecordedRun,
+    request: &PageRequest<'_>,
+    watcher: &dyn Watcher,
+) -> Result<(String, PageContent), Error> {
+    check_has_page()?;
+    let source = FrameSource::check(recorded, &request.scope, watcher)?;
+    let page = render(worlds, &request.spec(), &[source])?;
+    Ok((page.document, page.content))
+}
+
+impl PageRequest<'_> {
+    fn spec(&self) -> ReplaySpec<'_> {
+        let Self { scope, inspections, .. } = self;
+        ReplaySpec { every: scope.every, inspections, trial: None }
+    }
+}
+
+/// What a replay is to hold.
+pub(crate) struct ReplaySpec<'a> {
+    /// Number of cycles between two frames; none for the default.
+    pub(crate) every: Option<Cycle>,
+    pub(crate) inspections: &'a InspectionRequest,
+    /// What it is of a sweep; none for a run of its own.
+    pub(crate) trial: Option<TrialReplay<'a>>,
+}
+
+/// What is different in a replay of a run of a sweep.
+#[derive(Clone, Copy)]
+pub(crate) struct TrialReplay<'a> {
+    /// Its number in the sweep, as the name of a recording.
+    pub(crate) name: &'a str,
+    /// Its variant; empty if the sweep has only one.
+    pub(crate) variant: &'a str,
+    /// Longer side of its picture in pixels.
+    pub(crate) picture_px: u32,
+}
+
+/// A replay: its document, and what is in it.
+pub(crate) struct ReplayPage {
+    pub(crate) document: String,
+    pub(crate) content: PageContent,
+    /// The picture of a run of a sweep, as PNG.
+    pub(crate) picture: Option<Vec<u8>>,
+}
+
+/// Refuses a program that has no page.
+pub(crate) fn check_has_page() -> Result<(), InputError> {
+    page::entry_files().map(drop).ok_or_else(no_page)
+}
+
+/// Computes some runs again, and returns the page with what it will ask for.
+pub(crate) fn render(
+    worlds: &Worlds,
+    spec: &ReplaySpec<'_>,
+    sources: &[FrameSource<'_>],
+) -> Result<ReplayPage, Error> {
+    let files = page::entry_files().ok_or_else(no_page)?;
+    let ReplayContent { title, parts, content, picture } = collect(worlds, spec, sources)?;
+    Ok(ReplayPage { document: html::document(&title, &files, &parts), content, picture })
 }
 
 /// All of a replay but the page.
 struct ReplayContent {
     title: String,
     parts: String,
-    /// Whether the ends of all runs have the recorded digests.
-    is_confirmed: bool,
-    frames: u64,
-    every: Cycle,
-    inspections: usize,
-    events_left_out: u64,
+    content: PageContent,
+    picture: Option<Vec<u8>>,
 }
 
 /// Computes some runs again, and collects what the page will ask for.
 fn collect(
     worlds: &Worlds,
-    request: &PageRequest<'_>,
+    spec: &ReplaySpec<'_>,
     sources: &[FrameSource<'_>],
 ) -> Result<ReplayContent, Error> {
     let length = |source: &FrameSource<'_>| {
@@ -110,20 +182,15 @@ fn collect(
         until - from
     };
     let longest = sources.iter().map(length).max().unwrap_or(0);
-    let every = request.scope.every.unwrap_or_else(|| longest.div_ceil(MAX_FRAMES).max(1));
+    let every = spec.every.unwrap_or_else(|| longest.div_ceil(MAX_FRAMES).max(1));
     let has_digests = sources.len() > 1;
-    let options = ReplayOptions { every, has_digests, inspections: &request.inspections };
+    let options =
+        ReplayOptions { every, has_digests, inspections: spec.inspections, trial: spec.trial };
     let mut parts = Parts::default();
     let mut runs = Vec::with_capacity(sources.len());
-    let mut content = ReplayContent {
-        title: String::new(),
-        parts: String::new(),
-        is_confirmed: true,
-        frames: 0,
-        every,
-        inspections: 0,
-        events_left_out: 0,
-    };
+    let mut content =
+        PageContent { frames: 0, every, inspections: 0, events_left_out: 0, is_confirmed: true };
+    let mut picture = None;
     for source in sources {
         let replay = collect_run(worlds, source, &options, &mut parts)?;
         content.is_confirmed &= replay.is_confirmed;
@@ -131,15 +198,16 @@ fn collect(
             replay.run.chunks.iter().map(|chunk| u64::from(chunk.frames)).sum::<u64>();
         content.inspections += replay.inspections;
         content.events_left_out += replay.run.events_left_out;
+        picture = replay.picture;
         runs.push(replay.run);
     }
     distinguish(&mut runs);
-    let names: Vec<&str> = runs.iter().map(displayed_name).collect();
-    content.title = format!("{} · Sidestep replay", names.join(", "));
+    let names: Vec<String> =
+        runs.iter().map(|run| titled_name(run, spec.trial.is_some())).collect();
+    let title = format!("{} · Sidestep replay", names.join(", "));
     let program = format!("sidestep {}", worlds.build());
     let file = ReplayFile { version: VERSION, program, runs };
-    content.parts = parts.into_text(&file)?;
-    Ok(content)
+    Ok(ReplayContent { title, parts: parts.into_text(&file)?, content, picture })
 }
 
 /// A run of a replay, and what the command tells of it.
@@ -147,6 +215,7 @@ struct CollectedRun {
     run: ReplayRun,
     is_confirmed: bool,
     inspections: usize,
+    picture: Option<Vec<u8>>,
 }
 
 fn collect_run(
@@ -158,8 +227,11 @@ fn collect_run(
     let recorded = source.recorded();
     let (from, until) = source.cycles();
     let mut run = source.start()?;
-    let first = run.frame(FrameOptions::WITHOUT_SCANS);
-    options.inspections.check(&first, (from, until))?;
+    // Runs of a sweep may have fewer agents and cycles than others of it; the sweep is refused where none has them.
+    if options.trial.is_none() {
+        let first = run.frame(FrameOptions::WITHOUT_SCANS);
+        options.inspections.check(&first, (from, until))?;
+    }
     let world_type = worlds.find(run.world_name());
     let words = world_type.map(MetricWords::from_world).unwrap_or_default();
     // A recording that can only be shown has no metrics but those recorded.
@@ -171,13 +243,36 @@ fn collect_run(
     let last = run.cycle();
     let is_end = last == recorded.cycles_done;
     let origin = ReplayOrigin {
-        name: name_of(&recorded.path),
+        name: options.trial.map_or_else(|| name_of(&recorded.path), |trial| trial.name.into()),
         scenario: recorded.resolved_scenario()?.text,
         banner: banner((from, last), options.every, is_confirmed),
         digest: is_end.then(|| run.digest().to_string()),
     };
-    let replay = collector.finish(run.as_mut(), origin)?;
-    Ok(CollectedRun { run: replay, is_confirmed, inspections: collector.inspection_count() })
+    let picture = collector.picture(run.as_mut())?;
+    let mut replay = collector.finish(run.as_mut(), origin)?;
+    if let Some(trial) = options.trial {
+        replay.scene.name = named_trial(&replay.scene.name, trial.variant);
+    }
+    Ok(CollectedRun {
+        run: replay,
+        is_confirmed,
+        inspections: collector.inspection_count(),
+        picture,
+    })
+}
+
+/// Returns the name of a scenario with that of a variant of it.
+fn named_trial(scenario: &str, variant: &str) -> String {
+    match (scenario, variant) {
+        (name, "") | ("", name) => name.to_string(),
+        (scenario, variant) => format!("{scenario} ({variant})"),
+    }
+}
+
+/// Returns the name of a run in the title of a page, with the seed that tells a run of a sweep from others.
+fn titled_name(run: &ReplayRun, is_trial: bool) -> String {
+    let name = displayed_name(run);
+    if is_trial { format!("{name}, seed {}", run.status.seed) } else { name.to_string() }
 }
 
 /// Adds the names of the recordings to those of the scenarios, where these are the same.
@@ -214,10 +309,10 @@ fn banner((from, until): (Cycle, Cycle), every: Cycle, is_confirmed: bool) -> St
 }
 
 /// The error of a program that was built without the page.
-fn no_page() -> Error {
+fn no_page() -> InputError {
     let cause = "this program was built without the studio's page";
     let remedy = "build it with Node 20.19 or later: `SIDESTEP_PAGE=require cargo build --release`";
-    InputError::new("--to page", cause, remedy).into()
+    InputError::new("--to page", cause, remedy)
 }
 
 /// The error of something that JSON cannot hold, which is a bug.

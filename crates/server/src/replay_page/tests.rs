@@ -44,7 +44,7 @@ fn replay(text: &str, change: impl FnOnce(&mut PageRequest<'_>)) -> Replay {
     let mut request = PageRequest { scope, inspections, beside: None };
     change(&mut request);
     let source = FrameSource::check(&recorded, &request.scope, &NoWatcher).expect("recorded");
-    let content = collect(&WORLDS, &request, &[source]).expect("collected");
+    let content = collect(&WORLDS, &request.spec(), &[source]).expect("collected");
     Replay { place: folder.path().display().to_string(), _folder: folder, content }
 }
 
@@ -143,7 +143,7 @@ fn events_metrics_and_the_scenario_are_complete_and_name_no_folder() {
     let replay =
         replay(ROBOTS, |request| request.inspections.agents = vec!["2".parse().expect("a number")]);
     let run = replay.run();
-    assert!(replay.content.is_confirmed && run["digest"].is_string());
+    assert!(replay.content.content.is_confirmed && run["digest"].is_string());
     assert_eq!(run["cycles"], serde_json::json!([[0.0, 1.0, 301.0]]));
     let metrics = replay.part(&run["metrics"]);
     assert_eq!(metrics["cycles"].as_array().map(Vec::len), Some(301));
@@ -158,7 +158,7 @@ fn events_metrics_and_the_scenario_are_complete_and_name_no_folder() {
         .sum();
     let events = replay.part(&run["events"][0]["part"]);
     assert_eq!(events["text"].as_array().map(|all| all.len() as u64), Some(counted));
-    assert_eq!((run["name"].as_str(), replay.content.inspections), (Some("r"), 301));
+    assert_eq!((run["name"].as_str(), replay.content.content.inspections), (Some("r"), 301));
     for part in replay.parts() {
         assert!(!String::from_utf8_lossy(&part).contains(&replay.place));
     }
@@ -174,8 +174,8 @@ fn a_part_of_a_run_has_its_own_cycles_and_inspections() {
     });
     let run = replay.run();
     assert_eq!(run["cycles"], serde_json::json!([[100.0, 10.0, 11.0], [205.0, 1.0, 1.0]]));
-    assert!(run["digest"].is_null() && !replay.content.is_confirmed);
-    assert_eq!(replay.content.inspections, 12, "six robots in cycles 120 and 130");
+    assert!(run["digest"].is_null() && !replay.content.content.is_confirmed);
+    assert_eq!(replay.content.content.inspections, 12, "six robots in cycles 120 and 130");
     let span = &run["inspections"][0];
     assert_eq!((&span["from"], &span["until"]), (&120.0.into(), &130.0.into()));
     let first = &replay.part(&span["part"])[0];

@@ -4,8 +4,9 @@ use super::target::Target;
 use super::{CycleRange, ExportContext, ExportResult, ExportScope};
 use crate::driver::Sinks;
 use crate::{Error, FrameSink, PictureLook, RecordedRun, Watcher};
-use sidestep_kernel::{Cycle, Simulation};
+use sidestep_kernel::{Cycle, InputError, Simulation};
 use std::io::Write;
+use std::path::Path;
 
 /// A part of a recorded run whose frames are taken.
 pub struct FrameSource<'a> {
@@ -61,6 +62,43 @@ impl<'a> FrameSource<'a> {
         let sinks = Sinks { frames: Some(sink), ..Sinks::default() };
         self.job.drive(run, self.job.span.until, sinks)?;
         self.job.recorded.verify_digest(run)
+    }
+}
+
+/// A folder that does not exist yet, or may be replaced.
+pub struct ExportPlace {
+    target: Target,
+}
+
+impl ExportPlace {
+    /// Checks the place: the requested folder, or one beside a recorded run or a sweep with its name and `ending`.
+    ///
+    /// # Errors
+    /// When the folder exists and may not be replaced, or is the recording itself.
+    pub fn check(
+        recorded: &Path,
+        scope: &ExportScope<'_>,
+        ending: &str,
+    ) -> Result<Self, InputError> {
+        Ok(Self { target: Target::for_folder_beside(recorded, scope, ending)? })
+    }
+
+    /// Returns the path of the folder.
+    pub fn path(&self) -> &Path {
+        self.target.path()
+    }
+
+    /// Creates the folder: `fill` gets one with another name, which takes its place once it is whole, with a list of its
+    /// files.
+    ///
+    /// # Errors
+    /// Those of `fill`; an I/O error. Nothing is left then.
+    pub fn write<T>(
+        &self,
+        watcher: &dyn Watcher,
+        fill: impl FnOnce(&Path) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        self.target.write_folder(watcher, fill)
     }
 }
 

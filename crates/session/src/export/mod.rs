@@ -11,7 +11,7 @@ mod target;
 mod trajectory;
 
 pub use cycle_window::CycleWindow;
-pub use frame_export::{ExportFile, FrameSource};
+pub use frame_export::{ExportFile, ExportPlace, FrameSource};
 
 use crate::driver::{Sinks, drive};
 use crate::frame_sink::{BagSink, EndReason, McapSink};

@@ -1,6 +1,6 @@
 //! The place of an export.
 
-use super::ExportContext;
+use super::{ExportContext, ExportScope};
 use crate::files::{resolve_path, write_file};
 use crate::{Error, VERSION, Watcher};
 use sidestep_kernel::InputError;
@@ -23,9 +23,13 @@ impl Target {
     /// # Errors
     /// When that is the recording itself, or a folder that contains it: it would be lost.
     fn resolve(job: &ExportContext<'_>, ending: &str) -> Result<Self, InputError> {
-        let recorded = &job.recorded.path;
-        let path = job.wanted.out.map_or_else(|| default_path(recorded, ending), Path::to_path_buf);
-        let existing = if job.wanted.replace { IfExists::Replace } else { IfExists::Refuse };
+        Self::beside(&job.recorded.path, job.wanted, ending)
+    }
+
+    /// Returns the requested place, or one beside a recorded run or a sweep.
+    fn beside(recorded: &Path, wanted: &ExportScope<'_>, ending: &str) -> Result<Self, InputError> {
+        let path = wanted.out.map_or_else(|| default_path(recorded, ending), Path::to_path_buf);
+        let existing = if wanted.replace { IfExists::Replace } else { IfExists::Refuse };
         let target = Self { path, existing };
         if resolve_path(recorded).starts_with(resolve_path(&target.path)) {
             let cause = "this is the recording that is exported, or holds it";
@@ -59,7 +63,19 @@ impl Target {
     /// # Errors
     /// When the folder exists and may not be replaced.
     pub(super) fn for_folder(job: &ExportContext<'_>, ending: &str) -> Result<Self, InputError> {
-        let target = Self::resolve(job, ending)?;
+        Self::for_folder_beside(&job.recorded.path, job.wanted, ending)
+    }
+
+    /// Returns a folder: the requested one, or one beside a recorded run or a sweep.
+    ///
+    /// # Errors
+    /// When the folder exists and may not be replaced.
+    pub(super) fn for_folder_beside(
+        recorded: &Path,
+        wanted: &ExportScope<'_>,
+        ending: &str,
+    ) -> Result<Self, InputError> {
+        let target = Self::beside(recorded, wanted, ending)?;
         ExportFolder::check(&target.path, target.existing)?;
         Ok(target)
     }

@@ -2,12 +2,13 @@
 
 use super::metrics::{format_digits, omitted_rows_note};
 use super::tables::{format_cell, format_rows};
-use sidestep_document::figure::{Figure, FigureKind, Point, Series, Table};
+use sidestep_document::figure::{Figure, FigureKind, Point, RunMoment, Series, Table};
 use sidestep_document::{Document, document::Text};
 use sidestep_kernel::InputError;
 use sidestep_kernel::ports::ColumnValues;
 use sidestep_kernel::ports::table::split_unit;
 use sidestep_record::{Table as Recorded, read_table};
+use sidestep_scenario::facts::RecordedPositions;
 use std::path::Path;
 
 /// Largest number of events that are listed one by one.
@@ -28,7 +29,12 @@ fn column_label(name: &str) -> String {
 ///
 /// # Errors
 /// When the table is damaged.
-pub(super) fn append(document: &mut Document, folder: &Path, name: &str) -> Result<(), InputError> {
+pub(super) fn append(
+    document: &mut Document,
+    folder: &Path,
+    name: &str,
+    agents: Option<&RecordedPositions>,
+) -> Result<(), InputError> {
     // The rows of the first cycle are enough to see the columns; the whole table may be large.
     let Ok(first) = read_table(folder, name, ..1) else { return Ok(()) };
     if first.column("event").is_none() || first.column("cycle").is_none() {
@@ -47,7 +53,7 @@ pub(super) fn append(document: &mut Document, folder: &Path, name: &str) -> Resu
     let words = Text::from(format!("{} of ", format_rows(table.rows())));
     document.paragraph(words.append(Text::code(name)).append(format!("{partial}.")));
     document.tables([events.counts_table()]).figures(events.timeline());
-    document.tables([first_rows(&table)]);
+    document.tables([first_rows(&table, events.cycles, agents)]);
     Ok(())
 }
 
@@ -164,7 +170,8 @@ impl<'a> Events<'a> {
     }
 }
 
-fn first_rows(recorded: &Recorded) -> Table {
+/// Returns the first events, each with its moment; `agents` names the columns with the number of an agent.
+fn first_rows(recorded: &Recorded, cycles: &[u64], agents: Option<&RecordedPositions>) -> Table {
     let columns = &recorded.schema.columns;
     let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
     let shown = recorded.rows().min(MAX_ROWS);
@@ -173,6 +180,34 @@ fn first_rows(recorded: &Recorded) -> Table {
     for row in 0..shown {
         let cells = columns.iter().zip(&recorded.columns);
         table.push_row(cells.map(|(column, values)| format_cell(column, values, row)));
+        let agent = agents.and_then(|agents| agent_name(recorded, agents, row));
+        table.moments.push(RunMoment { cycle: cycles[row], agent });
     }
     table
+}
+
+/// Returns the agent that a row is about, as a replay names it; none if it is about another body.
+fn agent_name(recorded: &Recorded, agents: &RecordedPositions, row: usize) -> Option<String> {
+    let number = |column: &str| recorded.column(column)?.number(row).map(|number| number as u64);
+    let agent = number(agents.agent)?;
+    let kinds = agents.kinds;
+    if !kinds.is_empty() && !kinds.iter().any(|kind| is_of_kind(recorded, kind, agent)) {
+        return None;
+    }
+    match agents.part {
+        Some(part) => Some(format!("{agent}/{}", number(part)?)),
+        None => Some(agent.to_string()),
+    }
+}
+
+/// Returns whether a body is of a kind, by the ids of the kind in the facts of its table: `0-7`.
+fn is_of_kind(recorded: &Recorded, kind: &str, body: u64) -> bool {
+    let fact = format!("ids_{kind}");
+    let Some((_, ids)) = recorded.schema.about.iter().find(|(name, _)| *name == fact) else {
+        return false;
+    };
+    let range = ids
+        .split_once('-')
+        .and_then(|(first, last)| Some(first.parse::<u64>().ok()?..=last.parse::<u64>().ok()?));
+    range.is_some_and(|range| range.contains(&body))
 }

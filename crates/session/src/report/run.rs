@@ -40,12 +40,14 @@ pub(super) fn document(worlds: &Worlds, folder: &Path) -> Result<Document, Input
     if let Some(summary) = &summary {
         append_metrics(&mut document, &view.manifest, summary, meanings);
     }
+    let agents =
+        worlds.find(&view.manifest.world).and_then(|world_type| world_type.facts().positions);
     let tables = tables::table_names(folder)?;
     if tables.iter().any(|name| name == series::TABLE) {
         series::append(&mut document, folder, meanings)?;
     }
     for table in tables {
-        events::append(&mut document, folder, &table)?;
+        events::append(&mut document, folder, &table, agents.as_ref())?;
     }
     document.section("What was run").push(Block::Facts(facts(&view, summary.as_ref())));
     document.commands("How to run it again", reproduction_commands(&view));

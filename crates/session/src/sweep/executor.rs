@@ -55,12 +55,18 @@ pub struct TrialBatch<'a> {
     pub(super) worlds: &'a Worlds,
     /// The scenario of a variant.
     pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
+    pub(super) series: Option<&'a [String]>,
 }
 
 impl TrialBatch<'_> {
     /// Returns the trials, first those on which others may depend.
     pub fn trials(&self) -> &[Trial] {
         self.trials
+    }
+
+    /// Returns the metrics that the trials keep over time; none for those that their world is about.
+    pub fn series(&self) -> Option<&[String]> {
+        self.series
     }
 
     /// Returns the scenario of a variant, with all its files.

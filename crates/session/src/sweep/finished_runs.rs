@@ -84,7 +84,8 @@ pub(crate) fn run_picture(
     let place = tempfile::tempdir().map_err(|e| Error::cannot_write(&std::env::temp_dir(), &e))?;
     let again = place.path().join("run");
     let source = Source::read(&folder.scenario(trial.variant), &[])?;
-    let repeated = RecordedTrial { trial, source, workers: 1, folder: &again };
+    let series = folder.plan().series.as_deref();
+    let repeated = RecordedTrial { trial, source, workers: 1, folder: &again, series };
     let outcome = match repeated.run(worlds, &NestedWatcher(watcher)) {
         Err(Error::Input(e)) => return Ok(Err(e.cause().to_string())),
         result => result?.ok_or(Error::Interrupted)?,

@@ -20,7 +20,7 @@ pub(super) fn to_share(shard: Shard) -> Share {
 }
 
 /// Refuses another build: results may change between builds, so a single one makes all runs.
-pub(super) fn check_build(worlds: &Worlds, folder: &Folder) -> Result<(), InputError> {
+pub(crate) fn check_build(worlds: &Worlds, folder: &Folder) -> Result<(), InputError> {
     let manifest = folder.manifest();
     let producer =
         Producer { version: manifest.program_version.clone(), build: manifest.build.clone() };

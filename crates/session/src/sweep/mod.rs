@@ -28,6 +28,7 @@ pub use executor::{Engine, OutcomeSink, TrialBatch, TrialExecutor};
 pub(crate) use finished_runs::run_picture;
 pub use finished_runs::{FinishedRuns, read_finished};
 pub use folder::Folder;
+pub(crate) use folder::check_build;
 pub use json::failed_rows;
 pub(crate) use prepare::check_variants;
 pub use run::{
@@ -36,3 +37,4 @@ pub use run::{
 pub use status::{FailedRun, ShareStatus, SweepStatus, read_status};
 pub use task::Task;
 pub use timing::SweepTiming;
+pub use trial_runner::runs_at_once;

@@ -7,7 +7,8 @@ use crate::{Error, NoWatcher, Watcher};
 use sidestep_experiment::sweep::scheduler::run_trials;
 use sidestep_experiment::sweep::trial::metric_names;
 use sidestep_experiment::sweep::{BaseScenario, Plan, Setting, Sweep, Variant};
-use sidestep_kernel::InputError;
+use sidestep_kernel::series::SeriesInterval;
+use sidestep_kernel::{InputError, Simulation};
 use sidestep_scenario::{CompiledScenario, SeedEffect, Source, Worlds, suggestion};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -174,10 +175,12 @@ fn check_metrics(
     let of_until = sweep.until.iter().flat_map(|until| &until.metrics);
     let aims = sweep.better.iter().map(|aim| &aim.metric);
     let mut wanted = sweep.metrics.iter().chain(of_until).chain(aims).peekable();
-    if wanted.peek().is_none() {
+    let series = sweep.series.as_deref().unwrap_or_default();
+    if wanted.peek().is_none() && series.is_empty() {
         return Ok(());
     }
     let mut simulation = compiled.start(source, 1);
+    check_series(series, simulation.as_mut(), &sweep.place)?;
     // Some metrics appear only after the first cycle.
     simulation.advance(1);
     let known = metric_names(simulation.as_ref());
@@ -185,4 +188,20 @@ fn check_metrics(
     let known: Vec<&str> = known.iter().map(String::as_str).collect();
     let cause = format!("`{unknown}` is no metric of the world `{}`", compiled.world());
     Err(InputError::new(&sweep.place, cause, suggestion(unknown, &known)))
+}
+
+/// Checks that the metrics exist that are to be kept over time.
+fn check_series(
+    wanted: &[String],
+    simulation: &mut dyn Simulation,
+    place: &str,
+) -> Result<(), InputError> {
+    simulation.start_series(SeriesInterval::with_rows(1, 1));
+    let columns = simulation.series_columns();
+    let known: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+    let unknown = wanted.iter().find(|name| !known.contains(&name.as_str()));
+    let Some(unknown) = unknown else { return Ok(()) };
+    let world = simulation.world_name();
+    let cause = format!("`{unknown}` is no metric that runs of the world `{world}` keep over time");
+    Err(InputError::new(place, cause, suggestion(unknown, &known)))
 }

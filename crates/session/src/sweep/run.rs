@@ -88,7 +88,9 @@ pub fn run_in_memory<'a>(
     let (plan, sources) = prepare(worlds, sweep, engine.planning_workers(), watcher, make)?;
     let source = |variant: u32| Ok(sources[variant as usize].clone());
     let agents = plan.agents;
-    let runner = TrialRunner { worlds, agents, source: &source, record: None, engine, watcher };
+    let series = plan.series.as_deref();
+    let runner =
+        TrialRunner { worlds, agents, source: &source, record: None, series, engine, watcher };
     let mut scheduler = TrialScheduler::new(&plan);
     let mut rows = RunTableBuilder::default();
     let keeps_series = plan.keeps_series();
@@ -411,7 +413,9 @@ fn with_trial_runner(
     let run_folder = |trial: u64| -> PathBuf { folder.run_folder(trial) };
     let record: Option<&(dyn Fn(u64) -> PathBuf + Sync)> =
         if plan.record { Some(&run_folder) } else { None };
-    run(&TrialRunner { worlds, agents: plan.agents, source: &source, record, engine, watcher })
+    let agents = plan.agents;
+    let series = plan.series.as_deref();
+    run(&TrialRunner { worlds, agents, source: &source, record, series, engine, watcher })
 }
 
 /// Reads the scenario of a variant, checked when it is read for the first time: one that was edited since the plan was

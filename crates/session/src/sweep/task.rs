@@ -17,6 +17,8 @@ pub struct Task {
     pub scenarios: Vec<(u32, ResolvedScenario)>,
     /// The trials, in the order in which they are run.
     pub trials: Vec<Trial>,
+    /// The metrics that they keep over time; none for those that their world is about.
+    pub series: Option<Vec<String>>,
 }
 
 impl Task {
@@ -43,8 +45,16 @@ impl Task {
         let source = |variant: u32| find_source(&sources, variant);
         // One worker: the executor decides how many tasks a node runs at once.
         let engine = Engine::Workers(1);
-        let runner =
-            TrialRunner { worlds, agents: 0, source: &source, record: None, engine, watcher };
+        let series = self.series.as_deref();
+        let runner = TrialRunner {
+            worlds,
+            agents: 0,
+            source: &source,
+            record: None,
+            series,
+            engine,
+            watcher,
+        };
         let mut outcomes = Vec::with_capacity(self.trials.len());
         runner.run(&self.trials, 0, self.trials.len() as u64, &mut |outcome| {
             outcomes.push(outcome);

@@ -8,7 +8,7 @@ use crate::{Error, Watcher};
 use serde_json::json;
 use sidestep_experiment::sweep::scheduler::{self, run_trials};
 use sidestep_experiment::sweep::series::TrialSeries;
-use sidestep_experiment::sweep::trial::chart_metrics;
+use sidestep_experiment::sweep::trial::series_metrics;
 use sidestep_experiment::sweep::{Outcome, Trial, start_trial};
 use sidestep_kernel::InputError;
 use sidestep_record::{CycleOrigin, IfExists};
@@ -23,6 +23,12 @@ use std::time::Instant;
 /// wait for each other.
 const LARGE_WORLD_AGENTS: u64 = 20_000;
 
+/// Returns the number of runs in progress at once, of `runs` with at most so many agents.
+pub fn runs_at_once(agents: u64, workers: usize, runs: usize) -> usize {
+    let max = if agents >= LARGE_WORLD_AGENTS { 1 } else { workers };
+    max.min(runs).max(1)
+}
+
 /// Everything that is needed to run trials.
 pub(super) struct TrialRunner<'a> {
     pub(super) worlds: &'a Worlds,
@@ -32,6 +38,8 @@ pub(super) struct TrialRunner<'a> {
     pub(super) source: &'a (dyn Fn(u32) -> Result<Source, InputError> + Sync),
     /// Returns the folder in which the run of a trial is recorded, if it is.
     pub(super) record: Option<&'a (dyn Fn(u64) -> PathBuf + Sync)>,
+    /// The metrics that trials keep over time; none for those that their world is about.
+    pub(super) series: Option<&'a [String]>,
     pub(super) engine: Engine<'a>,
     pub(super) watcher: &'a dyn Watcher,
 }
@@ -81,8 +89,8 @@ impl TrialRunner<'_> {
         take: &mut OutcomeHandler<'_>,
     ) -> Result<(), Error> {
         let mut open: BTreeSet<u64> = trials.iter().map(|trial| trial.id).collect();
-        let Self { worlds, source, .. } = *self;
-        executor.run(&TrialBatch { trials, worlds, source }, &mut |outcome| {
+        let Self { worlds, source, series, .. } = *self;
+        executor.run(&TrialBatch { trials, worlds, source, series }, &mut |outcome| {
             if open.remove(&outcome.trial) {
                 return take(outcome);
             }
@@ -92,12 +100,10 @@ impl TrialRunner<'_> {
 
     /// Returns the number of `runs` in progress at once; each has its part of the workers.
     pub(super) fn parallelism(&self, runs: usize) -> usize {
-        let max = match self.engine {
-            Engine::Executor(executor) => executor.parallelism(),
-            Engine::Workers(_) if self.agents >= LARGE_WORLD_AGENTS => 1,
-            Engine::Workers(workers) => workers,
-        };
-        max.min(runs).max(1)
+        match self.engine {
+            Engine::Executor(executor) => executor.parallelism().min(runs).max(1),
+            Engine::Workers(workers) => runs_at_once(self.agents, workers, runs),
+        }
     }
 
     /// Runs a trial; `None` if it was interrupted.
@@ -113,7 +119,8 @@ impl TrialRunner<'_> {
         let result = catch_unwind(AssertUnwindSafe(|| match self.record {
             None => self.run_unrecorded(trial, &source, workers),
             Some(folder) => {
-                let run = RecordedTrial { trial, source, workers, folder: &folder(trial.id) };
+                let folder = &folder(trial.id);
+                let run = RecordedTrial { trial, source, workers, folder, series: self.series };
                 run.run(self.worlds, self.watcher)
             }
         }));
@@ -140,8 +147,11 @@ impl TrialRunner<'_> {
         workers: usize,
     ) -> Result<Option<Outcome>, Error> {
         let started_at = Instant::now();
-        let started = start_trial(self.worlds, trial, variant, workers)?
+        let mut started = start_trial(self.worlds, trial, variant, workers)?
             .with_interrupt(self.watcher.interrupt());
+        if let Some(series) = self.series {
+            started = started.with_series(series.to_vec());
+        }
         let compiled_at = Instant::now();
         let outcome = started.run(&|| self.watcher.should_continue());
         let times = [compiled_at - started_at, compiled_at.elapsed()];
@@ -156,6 +166,8 @@ pub(super) struct RecordedTrial<'a> {
     pub(super) source: Source,
     pub(super) workers: usize,
     pub(super) folder: &'a Path,
+    /// The metrics that it keeps over time; none for those that its world is about.
+    pub(super) series: Option<&'a [String]>,
 }
 
 impl RecordedTrial<'_> {
@@ -169,7 +181,7 @@ impl RecordedTrial<'_> {
         worlds: &Worlds,
         watcher: &dyn Watcher,
     ) -> Result<Option<Outcome>, Error> {
-        let Self { trial, source, workers, folder } = self;
+        let Self { trial, source, workers, folder, series } = self;
         let started_at = Instant::now();
         let source = source.with_overrides(&[format!("seed={}", trial.seed)])?;
         let compiled = worlds.compile(&source)?;
@@ -186,7 +198,7 @@ impl RecordedTrial<'_> {
         let recording =
             RunRecorder::create(folder, &resolved, run.as_mut(), plan).map_err(folder_error)?;
         let until = run.config().cycles;
-        let metrics = chart_metrics(worlds, compiled.world());
+        let metrics = series_metrics(worlds, compiled.world(), series);
         let series = TrialSeries::start(run.as_mut(), until, metrics);
         let compiled_at = Instant::now();
         let is_complete = record_to_end(run.as_mut(), recording, workers, &NestedWatcher(watcher))?;

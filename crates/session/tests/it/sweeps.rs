@@ -165,7 +165,8 @@ impl ExternalExecutor {
         variants.dedup();
         let scenario = |variant: u32| (variant, deal.scenario(variant).expect("there"));
         let scenarios = variants.into_iter().map(scenario).collect();
-        Task { build: BUILD.into(), scenarios, trials: trials.to_vec() }
+        let series = deal.series().map(<[String]>::to_vec);
+        Task { build: BUILD.into(), scenarios, trials: trials.to_vec(), series }
     }
 
     fn outcomes(deal: &TrialBatch<'_>, trials: &[Trial]) -> Vec<Outcome> {
@@ -211,7 +212,8 @@ fn others_who_run_the_trials_come_to_the_same_table_in_any_order_and_any_number_
 
 #[test]
 fn a_task_of_another_build_is_refused_and_so_is_recording_by_others() {
-    let task = Task { build: "0.0.1+0".into(), scenarios: Vec::new(), trials: Vec::new() };
+    let build = "0.0.1+0".to_string();
+    let task = Task { build, scenarios: Vec::new(), trials: Vec::new(), series: None };
     let told = task.run(&WORLDS, &NoWatcher).expect_err("another build").to_string();
     assert!(told.contains("0.0.1+0") && told.contains(BUILD), "{told}");
 
