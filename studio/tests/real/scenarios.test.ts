@@ -56,6 +56,11 @@ describe.skipIf(BINARY === "")("the real program", () => {
         await page.locator(".agents .row:not(.group)").nth(2).click();
         if (width === 400) await page.getByRole("tab", { name: "inspector" }).click();
         await page.locator(".inspector details, .inspector .problem").first().waitFor();
+        // No table of the inspector is cut off at the side.
+        const cut = await page
+          .getByRole("region", { name: /^Table: / })
+          .evaluateAll((tables) => tables.filter((table) => table.scrollWidth > table.clientWidth).length);
+        expect(cut).toBe(0);
         if (width === 1280) await page.locator(".chart .value").filter({ hasText: /\d/ }).first().waitFor();
         await page.screenshot({
           path: `screenshots/real-${folder}-${name.replace(".toml", "")}-${width}${isDark ? "-dark" : ""}.png`,

@@ -45,3 +45,22 @@ test("a session that has ended on the server is not live", () => {
   client.ended = makeProblem("session", "it failed", "restart it");
   expect(client.isLive).toBe(false);
 });
+
+test("a problem is mended once a request of the same method succeeds", async () => {
+  const host = new FakeHost();
+  const mended: string[] = [];
+  Object.assign(host, { onMended: (problem: { cause: string }) => mended.push(problem.cause) });
+  const client = new SessionClient(host);
+  client.id = 1;
+  const refused = client.send({ do: "restart", seed: null, text: "seed = [" });
+  await host.refuse("restart", makeProblem("s.toml", "the list is not closed", "close it"));
+  expect(await refused).toBe(null);
+  void client.send({ do: "pause" });
+  await host.reply("pause", { is: "done" });
+  expect([host.problems.length, mended]).toEqual([1, []]);
+  void client.send({ do: "restart", seed: null, text: "seed = 1" });
+  await host.reply("restart", { is: "done" });
+  expect(mended).toEqual(["the list is not closed"]);
+  client.mend("restart");
+  expect(mended.length).toBe(1);
+});
