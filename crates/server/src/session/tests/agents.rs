@@ -40,7 +40,7 @@ fn a_scene_names_the_groups_of_its_agents() {
 #[test]
 fn metrics_of_agents_are_those_of_a_plain_run_in_every_world() {
     for (text, cycle, key) in
-        [(COURIERS, 200, "counts.contacts"), (CHAINS, 60, "vetoes"), (AIRPLANES, 30, "alone_s")]
+        [(COURIERS, 200, "counts.contacts"), (CHAINS, 60, "progress"), (AIRPLANES, 30, "alone_s")]
     {
         let (mut page, _) = Page::open(text, 2);
         let digest = page.digest_at(cycle);
