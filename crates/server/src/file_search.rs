@@ -3,7 +3,6 @@
 use crate::encode::problem;
 use crate::files::{AllowedFiles, file_entry, folder_paths, kind_of_folder};
 use crate::protocol::{FileEntry, FileKind, Problem};
-use sidestep_kernel::shell::sidestep_command;
 use sidestep_scenario::{ImportOptions, Source, Worlds};
 use std::collections::VecDeque;
 use std::fs;
@@ -151,10 +150,10 @@ fn wrong_file(path: &Path, worlds: &Worlds) -> Problem {
             "choose the whole folder in which it lies: it has run.json or sweep.json",
         ),
         "html" => told("is a page: a report, or a replay", "open it in the browser, by itself"),
-        "db3" | "bag" => {
-            let remedy = format!("learn errors from it: `{} ...`", sidestep_command("learn", path));
-            told("is a bag of a robot's messages, and no recording of Sidestep", &remedy)
-        }
+        "db3" | "bag" => told(
+            "is a bag of a robot's messages, and no recording of Sidestep",
+            "learn errors from it by the command: `sidestep learn --help`",
+        ),
         _ => match worlds.import_scenario(path, &ImportOptions::default()) {
             Err(error) => Problem { place: name.as_str().into(), ..problem(&error) },
             Ok(Some(imported)) => match imported.scenario {

@@ -5,8 +5,8 @@ use crate::protocol::StoreUsage;
 use crate::usage::UsageRegistry;
 use std::sync::mpsc::RecvTimeoutError::Disconnected;
 
-/// Cycles of a run with so much of everything that its stores are full: at 5 cycles a second, seven hours of play.
-const LONG_CYCLES: u64 = 120_000;
+/// Cycles of a run with so much of everything that its stores are full: at 5 cycles a second, twelve hours of play.
+const LONG_CYCLES: u64 = 220_000;
 
 /// A run with more events than are kept.
 fn long_robots() -> String {
