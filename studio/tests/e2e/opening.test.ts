@@ -53,6 +53,15 @@ for (const [width, isDark] of [
       [...document.querySelectorAll<HTMLImageElement>(".card img")].every((image) => image.naturalWidth > 0),
     );
     await page.getByText("Ten thousand robots in a hall.").waitFor();
+    // A picture of another shape is shown whole, within its frame.
+    const outside = await page.locator(".frame").evaluateAll(
+      (frames) =>
+        frames.filter((frame) => {
+          const [outer, inner] = [frame.getBoundingClientRect(), frame.querySelector("img")!.getBoundingClientRect()];
+          return inner.bottom > outer.bottom + 0.5 || inner.right > outer.right + 0.5;
+        }).length,
+    );
+    expect(outside).toBe(0);
     await page.screenshot({ path: `screenshots/welcome-${width}-${isDark ? "dark" : "light"}.png` });
     const overflows = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
     expect(overflows).toBe(false);
