@@ -32,7 +32,7 @@ Examples:
   sidestep export runs/hall --to lorr               for PlanViz of the League
   sidestep export runs/reacher --to trajectory      motions of arms for ROS 2
   sidestep export runs/office --to gif --cycles 1000:2000
-  sidestep export runs/office --to png --agents 1,4,8 --cycles 200:400 --size 1200x800
+  sidestep export runs/office --to png --agents 1,4,8 --cycles 200:400
   sidestep export office.mcap --to mp4-frames       frames, and a call of ffmpeg
   sidestep export runs/office --to page --agents 1  one file for any browser
   sidestep export sweeps/methods --to page          its runs, each with a replay
