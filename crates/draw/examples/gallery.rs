@@ -99,6 +99,7 @@ fn corridor() -> Result<String, DrawError> {
         names: Vec::new(),
         groups: Vec::new(),
         earth: Default::default(),
+        traffic: None,
     };
     let frame = Frame { bodies, ..Frame::default() };
     let trails: Vec<Trail> = (0..).zip(&paths).map(trail).collect();

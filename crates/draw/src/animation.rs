@@ -9,8 +9,8 @@ use sidestep_kernel::view::{Frame, Scenery, Trail, Vec3};
 use crate::error::DrawError;
 use crate::picture::canvas::{Camera, Canvas};
 use crate::picture::{
-    PictureView, Scene, TrailChoice, animation_bounds, best_camera, check_content, check_view,
-    projected_bounds,
+    PictureView, PlanFilm, Scene, TrailChoice, animation_bounds, best_camera, check_content,
+    check_view, film_altitudes_m, projected_bounds,
 };
 use crate::raster::parse;
 use crate::svg::{Anchor, Rect, Svg, TextStyle};
@@ -57,6 +57,8 @@ pub struct AnimationRenderer {
     trails: TrailChoice,
     canvas: Canvas,
     window: Rect,
+    /// The plan view of traffic.
+    plan: Option<PlanFilm>,
     background: Pixmap,
 }
 
@@ -75,25 +77,36 @@ impl AnimationRenderer {
         check_view(&scenery, look.view)?;
         check_content(&scenery, &Frame::default(), &[])?;
         let box_m = animation_bounds(&scenery, frames)?;
-        let camera = look.view.camera().unwrap_or_else(|| usual_camera(&scenery, frames));
-        let (canvas, window) = canvas(camera, box_m, look.size);
-        let canvas = Canvas { is_plane: scenery.dimensions == 2, ..canvas };
+        let is_plan = scenery.traffic.is_some() && look.view.is_from_above();
+        let usual = || if is_plan { Camera::ABOVE } else { usual_camera(&scenery, frames) };
+        let camera = look.view.camera().unwrap_or_else(usual);
+        let altitudes_m = film_altitudes_m(&scenery, box_m);
+        let below_px =
+            if is_plan { PlanFilm::profile_room_px(look.size, altitudes_m) } else { 0.0 };
+        let (canvas, window) = canvas(camera, box_m, look.size, below_px);
+        let canvas = Canvas { is_plane: scenery.dimensions == 2 || is_plan, ..canvas };
+        let plan = is_plan.then(|| PlanFilm::new(frames, canvas, window, altitudes_m));
         let (width, height) = match look.size {
             AnimationSize::LongerSide(_) => {
-                (window.width as u32, window.height as u32 + CAPTION_HEIGHT_PX)
+                let bottom_px = plan.as_ref().map_or(window.bottom(), PlanFilm::bottom_px);
+                (window.width as u32, bottom_px as u32 + CAPTION_HEIGHT_PX)
             }
             AnimationSize::Exact([width, height]) => (width, height),
         };
         let mut still = Pixmap::new(width, height).ok_or_else(no_area)?;
         still.fill(Color::WHITE);
         let trails = look.trails.clone();
-        let mut film = Self { scenery, trails, canvas, window, background: still };
+        let mut film = Self { scenery, trails, canvas, window, plan, background: still };
         let mut svg = Svg::default();
         let nothing = Frame::default();
         let scene = Scene::new(&film.scenery, &nothing, &[], &film.trails);
-        svg.open_clip(window);
-        scene.draw_still(&mut svg, &film.canvas);
-        svg.close_group();
+        if let Some(plan) = &film.plan {
+            plan.draw_still(&mut svg, &film.scenery);
+        } else {
+            svg.open_clip(window);
+            scene.draw_still(&mut svg, &film.canvas);
+            svg.close_group();
+        }
         film.background = film.composite(svg)?;
         Ok(film)
     }
@@ -116,9 +129,13 @@ impl AnimationRenderer {
         check_content(&self.scenery, frame, trails)?;
         let scene = Scene::new(&self.scenery, frame, trails, &self.trails).with_thin_trails();
         let mut svg = Svg::default();
-        svg.open_clip(self.window);
-        scene.draw_moving(&mut svg, &self.canvas);
-        svg.close_group();
+        if let (Some(plan), Some(traffic)) = (&self.plan, &self.scenery.traffic) {
+            plan.draw_moving(&mut svg, &scene, traffic);
+        } else {
+            svg.open_clip(self.window);
+            scene.draw_moving(&mut svg, &self.canvas);
+            svg.close_group();
+        }
         let baseline = f64::from(self.background.height() - CAPTION_HEIGHT_PX) + 17.0;
         svg.text(8.0, baseline, caption, &TextStyle::new(13.0, Anchor::Start));
         Ok(AnimationFrame(self.composite(svg)?))
@@ -171,8 +188,9 @@ fn usual_camera(scenery: &Scenery, frames: &[Frame]) -> Camera {
     best_camera(&frames.iter().collect::<Vec<_>>(), &[])
 }
 
-/// Returns the canvas that shows a box in a picture of some size, and the part of the picture that it takes.
-fn canvas(camera: Camera, box_m: [Vec3; 2], size: AnimationSize) -> (Canvas, Rect) {
+/// Returns the canvas that shows a box in a picture of some size, and the part of the picture that it takes; of an exact
+/// size `below_px` are left free below it.
+fn canvas(camera: Camera, box_m: [Vec3; 2], size: AnimationSize, below_px: f64) -> (Canvas, Rect) {
     let [lo, hi] = projected_bounds(camera, box_m);
     let size_m = [hi[0] - lo[0], hi[1] - lo[1]];
     let (px_per_m, window) = match size {
@@ -182,7 +200,8 @@ fn canvas(camera: Camera, box_m: [Vec3; 2], size: AnimationSize) -> (Canvas, Rec
             (px_per_m, Rect { x: 0.0, y: 0.0, width, height })
         }
         AnimationSize::Exact([width, height]) => {
-            let room_px = [f64::from(width), f64::from(height - CAPTION_HEIGHT_PX)];
+            let height_px = f64::from(height - CAPTION_HEIGHT_PX) - below_px;
+            let room_px = [f64::from(width), height_px.max(1.0)];
             let px_per_m = (room_px[0] / size_m[0]).min(room_px[1] / size_m[1]);
             let [width, height] = size_m.map(|length_m| length_m * px_per_m);
             let x = 0.5 * (room_px[0] - width);

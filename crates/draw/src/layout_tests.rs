@@ -95,6 +95,7 @@ fn bodies(dimensions: u8, n: u32, style: Style) -> String {
         bodies: (0..n).map(still).collect(),
         names: (0..n).map(name).collect(),
         earth: Default::default(),
+        traffic: None,
         ..open(dimensions)
     };
     let chain = |k: u32| (0..=k).map(move |part| ball(CONNECTOR, k, at(part), 0.2).with_part(part));

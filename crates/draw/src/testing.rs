@@ -24,6 +24,7 @@ pub(crate) fn open(dimensions: u8) -> Scenery {
         names: vec![],
         groups: vec![],
         earth,
+        traffic: None,
     }
 }
 

@@ -34,6 +34,7 @@ impl Scene {
             names: Vec::new(),
             groups: Vec::new(),
             earth: Default::default(),
+            traffic: None,
         };
         let frame = Frame { bodies: self.bodies.clone(), ..Frame::default() };
         draw(&scenery, &frame, &self.trails, &PictureOptions::page(&scenery, "")).unwrap()

@@ -139,6 +139,7 @@ impl WorldView for PondWorld {
             names: Vec::new(),
             groups: Vec::new(),
             earth: Default::default(),
+            traffic: None,
         }
     }
 

@@ -44,6 +44,7 @@ impl ArmPicture<'_> {
             names: vec![(CONNECTOR, 0, self.robot.into())],
             groups: Vec::new(),
             earth: Default::default(),
+            traffic: None,
         };
         let frame = Frame { bodies: self.arm(length_m), ..Frame::default() };
         let caption = "Positions in m in the frame of the base.";

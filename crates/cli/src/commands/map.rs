@@ -182,6 +182,7 @@ fn draw_boxes(map: &GridMap, file: &Path, png: &Path) -> Result<(), Failure> {
         names: Vec::new(),
         groups: Vec::new(),
         earth: Default::default(),
+        traffic: None,
     };
     let caption = format!("{} x {} boxes of {} m", map.width(), map.height(), map.box_size_m);
     let svg = draw(&scenery, &Frame::default(), &[], &PictureOptions::page(&scenery, caption))?;

@@ -104,16 +104,17 @@ fn recorded_traffic_is_drawn_with_callsigns_and_directions() {
     place.json(&["run", "sky.toml", "--out", "r"]);
     let svg = place.read("r/trajectories.svg");
     assert!(svg.contains("KLM204") && svg.contains("airplane 1"), "{svg}");
-    assert_eq!(of_class(&svg, "direction").len(), 2, "each way has an arrowhead");
+    let directions = of_class(&svg, "direction").len() + of_class(&svg, "aircraft").len();
+    assert_eq!(directions, 2, "each has a symbol, or an arrowhead on its track where it is gone");
 }
 
 #[test]
-fn airplanes_are_drawn_with_their_zones_starts_and_goals() {
+fn airplanes_are_drawn_in_plan_view_with_their_zones_and_routes() {
     let place = TestFolder::new();
     let file = format!("{SCENARIOS}/airspace/superconflict.toml");
     place.json(&["run", &file, "--set", "cycles=40", "--out", "r"]);
     let svg = place.read("r/trajectories.svg");
-    for word in ["start", "goal", "zone of separation", "airplane 0", "km"] {
+    for word in ["north (km)", "beginning of a track", "zone", "velocity", "route", "airplane 0"] {
         assert!(svg.contains(word), "{word}");
     }
     let trails = svg.matches(r#"class="trail""#).count();

@@ -77,7 +77,7 @@ fn body_rects<'a>(scene: &Scene<'a>, canvas: &'a Canvas) -> impl Iterator<Item =
 }
 
 /// Draws an arrowhead in the middle of a line, which shows where it goes.
-fn draw_direction(svg: &mut Svg, trail: &DrawnTrail<'_>, canvas: &Canvas, color: &str) {
+pub(super) fn draw_direction(svg: &mut Svg, trail: &DrawnTrail<'_>, canvas: &Canvas, color: &str) {
     let points: Vec<Px> = trail.points.iter().map(|&(_, at)| canvas.px(at)).collect();
     let half = 0.5 * points.windows(2).map(length_px).sum::<f64>();
     // A short line has no space for a head.

@@ -9,6 +9,7 @@
 //! palette.rs     the colors of agents, by group             view.rs    the direction of view
 //! size.rs        a picture of exactly some size            surroundings.rs  balls around agents in space
 //! shadows.rs     the floor in space, and shadows on it
+//! plan/           traffic in plan view, with a vertical profile
 //! ```
 
 mod bodies;
@@ -18,6 +19,7 @@ mod floor;
 mod labels;
 mod map_legend;
 mod palette;
+mod plan;
 mod shadows;
 mod sheet;
 mod size;
@@ -32,6 +34,8 @@ mod view;
 pub use map_legend::describe;
 pub use trails::{TrailChoice, bodies_with_trails};
 pub use view::PictureView;
+
+pub(crate) use plan::{PlanFilm, film_altitudes_m};
 
 pub(crate) use extent::{animation_bounds, check_content, projected_bounds};
 pub(crate) use surroundings::best_camera;
@@ -83,8 +87,9 @@ impl PictureOptions {
     }
 }
 
-/// Draws a moment of a run, with the trails that led to it: from above if everything lies in a plane,
-/// otherwise in parallel projection from the side that the options choose. The scale is the same in all directions.
+/// Draws a moment of a run, with the trails that led to it: from above if everything lies in a plane, traffic in plan
+/// view with north up, and all else in parallel projection, each unless the options choose a side. The scale is the same
+/// in all directions, but for the altitudes of a plan's profile.
 ///
 /// Only trails that can be distinguished are drawn ([`bodies_with_trails`]), or those of the chosen agents: as wide as
 /// the body on a floor, otherwise as lines; the older, the paler. Agents have the color of their group where a scenario
@@ -116,8 +121,7 @@ pub fn draw(
 
 /// Refuses views of a plane other than that from above: they would show a line.
 pub(crate) fn check_view(scenery: &Scenery, view: PictureView) -> Result<(), DrawError> {
-    let is_from_above = matches!(view, PictureView::Usual | PictureView::Top);
-    if scenery.dimensions == 2 && !is_from_above {
+    if scenery.dimensions == 2 && !view.is_from_above() {
         return Err(DrawError::FlatView(view.to_string()));
     }
     Ok(())
@@ -134,6 +138,9 @@ fn draw_scene(
     options: &PictureOptions,
     legend: LegendPlace,
 ) -> Result<DrawnPicture, DrawError> {
+    if let Some(traffic) = scene.scenery.traffic.as_ref().filter(|_| options.view.is_from_above()) {
+        return plan::draw(scene, traffic, options);
+    }
     if scene.is_plane() {
         return on_sheet(scene, options, (["x", "y"], Camera::ABOVE), legend);
     }

@@ -15,7 +15,7 @@ const FORMS: &str = "top, side, front or AZIMUTH,ELEVATION in degrees, like -60,
 /// The direction from which a picture shows a run; all views are parallel projections.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum PictureView {
-    /// From above where all lies in a plane; otherwise the view that shows most of the agents.
+    /// From above where all lies in a plane, and of traffic, as a plan; otherwise the view that shows most of the agents.
     #[default]
     Usual,
     /// From above: x to the right, y up.
@@ -42,6 +42,11 @@ impl PictureView {
             Self::Front => Some((["x", "z"], Camera::FRONT)),
             Self::Usual | Self::From { .. } => None,
         }
+    }
+
+    /// Returns whether it shows a plane, or traffic, from above.
+    pub(crate) fn is_from_above(self) -> bool {
+        matches!(self, Self::Usual | Self::Top)
     }
 
     /// Returns its camera; none for the view that depends on what is shown.

@@ -72,7 +72,7 @@ pub struct Body {
     pub shape: Shape,
     /// Its condition.
     pub state: BodyCondition,
-    /// The velocity of a moving obstacle, which does not act; zero for all other bodies.
+    /// The velocity over the ground of traffic, and of a moving obstacle, which does not act; zero for all other bodies.
     pub velocity_m_s: Vec3,
 }
 

@@ -14,6 +14,7 @@ mod inspect;
 mod kind;
 mod log;
 mod pose;
+mod traffic;
 mod trails;
 
 pub use appearance::Appearance;
@@ -29,6 +30,7 @@ pub use inspect::{Fact, FactSection, FactTable, FactValue, Inspection, Mark, Mar
 pub use kind::{BodyKind, BodyRole, KindSpec, Kinds, LegendTexts, Outline, Paint, TrailStyle};
 pub use log::{EventBuffer, LogEvent, LogEventKind, Quantity, Severity};
 pub use pose::{CachedIsometry2, Isometry2, Pose, Vec3};
+pub use traffic::{AreaLevels, Route, TrafficPlan};
 pub use trails::{CoordinateColumn, PositionTableColumns, Trail, corner_of_move};
 
 use crate::units::Cycle;
@@ -54,6 +56,9 @@ pub struct Scenery {
     pub groups: Vec<AgentGroup>,
     /// Where on earth, and when, all this is.
     pub earth: EarthReference,
+    /// What maps show of traffic beside bodies; none where a scene is no traffic.
+    #[serde(default)]
+    pub traffic: Option<TrafficPlan>,
 }
 
 /// A floor of square boxes, along the axes of its own plane.

@@ -264,6 +264,7 @@ mod tests {
             names: Vec::new(),
             groups: Vec::new(),
             earth: Default::default(),
+            traffic: None,
         };
         rows().trails(&scenery, &frame, &[BodyId::new(ROBOT, 7, None)], column)
     }

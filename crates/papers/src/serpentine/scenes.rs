@@ -118,6 +118,7 @@ fn scene_of_chain(title: &str, points: Vec<Point<2>>) -> Scene {
             names: vec![(CONNECTOR, 0, "chain".into())],
             groups: Vec::new(),
             earth: Default::default(),
+            traffic: None,
         },
         frame: Frame { bodies: chain(points), ..Frame::default() },
         trails: Vec::new(),

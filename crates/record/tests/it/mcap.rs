@@ -48,6 +48,7 @@ fn scenery() -> Scenery {
         names: Vec::new(),
         groups: Vec::new(),
         earth: Default::default(),
+        traffic: None,
         bodies: vec![Body::new(BodyKind::OBSTACLE, 0, Pose::from_position([0.0; 3]), wall)],
     }
 }

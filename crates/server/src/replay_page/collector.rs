@@ -1,7 +1,7 @@
 //! Collects all that a replay shows of a run, while the run is computed again.
 
-use super::agent_rows::AgentRows;
 use super::TrialReplay;
+use super::agent_rows::AgentRows;
 use super::agents::InspectionRequest;
 use super::chunk::ChunkBuilder;
 use super::extent::finest_step_exponent;

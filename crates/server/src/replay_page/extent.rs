@@ -82,6 +82,7 @@ mod tests {
             names: Vec::new(),
             groups: Vec::new(),
             earth: EarthReference::default(),
+            traffic: None,
         };
         finest_step_exponent(&scenery, &frame)
     }

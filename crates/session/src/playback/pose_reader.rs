@@ -34,6 +34,13 @@ struct Window {
     table: Option<Table>,
 }
 
+/// Where a body is by its rows, and how it moves.
+struct RecordedMotion {
+    pose: Pose,
+    /// The velocity of traffic; none of other bodies, which keep theirs.
+    velocity_m_s: Option<Vec3>,
+}
+
 impl PoseReader {
     /// Opens the tables of a folder.
     ///
@@ -102,7 +109,7 @@ impl PoseReader {
         rows: &PositionTableColumns,
         table: &Table,
         cycle: Cycle,
-    ) -> Vec<(BodyId, Pose)> {
+    ) -> Vec<(BodyId, RecordedMotion)> {
         let Some(headings) = last_headings(rows, table, cycle) else { return Vec::new() };
         let whose: Vec<BodyId> = headings.keys().copied().collect();
         let mut bodies = Vec::new();
@@ -116,14 +123,31 @@ impl PoseReader {
         let mut poses = Vec::new();
         for Trail { of, points } in trails.unwrap_or_default() {
             if let Some(pose) = last_pose(rows, &points, headings[&of], cycle) {
-                poses.push((of, pose));
+                let velocity_m_s = self.velocity_m_s(&points, cycle);
+                poses.push((of, RecordedMotion { pose, velocity_m_s }));
             }
         }
         poses
     }
 
+    /// Returns the velocity of traffic between its last two points; zero before its second one.
+    fn velocity_m_s(&self, points: &[(Cycle, Vec3)], cycle: Cycle) -> Option<Vec3> {
+        self.scenery.traffic.as_ref()?;
+        let known = points.partition_point(|(at, _)| *at <= cycle);
+        if known < 2 {
+            return Some([0.0; 3]);
+        }
+        let (from, from_m) = points[known - 2];
+        let (to, to_m) = points[known - 1];
+        let time_s = (to - from) as f64 * self.scenery.cycle_s;
+        if time_s <= 0.0 {
+            return Some([0.0; 3]);
+        }
+        Some(std::array::from_fn(|k| (to_m[k] - from_m[k]) / time_s))
+    }
+
     /// Returns the bodies at their places, the known ones in the order of the start.
-    fn bodies_with_poses(&self, poses: &BTreeMap<BodyId, Pose>) -> Vec<Body> {
+    fn bodies_with_poses(&self, poses: &BTreeMap<BodyId, RecordedMotion>) -> Vec<Body> {
         let mut used = BTreeSet::new();
         let mut joints: BTreeMap<u32, u32> = BTreeMap::new();
         let mut bodies = Vec::new();
@@ -135,12 +159,17 @@ impl PoseReader {
                     let joint = joints.entry(body.number).or_default();
                     line_through_parts(body, kind, poses, joint)
                 }
-                BodyRole::AroundAgent(kind) => poses
-                    .get(&BodyId::new(kind, body.number, None))
-                    .map(|pose| Body { pose: Pose::from_position(pose.at_m), ..body.clone() }),
-                _ => recorded_id.and_then(|id| poses.get(&id)).map(|pose| {
+                BodyRole::AroundAgent(kind) => {
+                    poses.get(&BodyId::new(kind, body.number, None)).map(|motion| Body {
+                        pose: Pose::from_position(motion.pose.at_m),
+                        ..body.clone()
+                    })
+                }
+                _ => recorded_id.and_then(|id| poses.get(&id)).map(|motion| {
                     used.extend(recorded_id);
-                    Body { pose: *pose, ..body.clone() }
+                    let RecordedMotion { pose, velocity_m_s } = *motion;
+                    let velocity_m_s = velocity_m_s.unwrap_or(body.velocity_m_s);
+                    Body { pose, velocity_m_s, ..body.clone() }
                 }),
             };
             // What has no rows in any table does not move, such as a door or an obstacle. Agents without rows do: robots
@@ -155,7 +184,7 @@ impl PoseReader {
             }
         }
         let late = poses.iter().filter(|(who, _)| !used.contains(*who));
-        bodies.extend(late.map(|(who, pose)| self.new_body(*who, *pose)));
+        bodies.extend(late.map(|(who, motion)| self.new_body(*who, motion)));
         bodies
     }
 
@@ -166,11 +195,13 @@ impl PoseReader {
     }
 
     /// Returns a body that was not there at the start; it looks like the others of its kind.
-    fn new_body(&self, who: BodyId, pose: Pose) -> Body {
+    fn new_body(&self, who: BodyId, motion: &RecordedMotion) -> Body {
         let BodyId { kind, number, part } = who;
         let other = self.first.iter().find(|body| body.kind == kind);
         let shape = other.map_or(Shape::Sphere { radius_m: 1.0 }, |body| body.shape.clone());
-        Body { part, ..Body::new(kind, number, pose, shape) }
+        let RecordedMotion { pose, velocity_m_s } = *motion;
+        let velocity_m_s = velocity_m_s.unwrap_or_default();
+        Body { part, velocity_m_s, ..Body::new(kind, number, pose, shape) }
     }
 }
 
@@ -204,7 +235,7 @@ fn has_rows_in(rows: &PositionTableColumns, body: &Body) -> bool {
 fn line_through_parts(
     body: &Body,
     kind: BodyKind,
-    poses: &BTreeMap<BodyId, Pose>,
+    poses: &BTreeMap<BodyId, RecordedMotion>,
     joint: &mut u32,
 ) -> Option<Body> {
     let Shape::Line { points_m, thickness_m } = &body.shape else { return None };
@@ -213,7 +244,7 @@ fn line_through_parts(
     let mut joints_m = Vec::with_capacity(points_m.len());
     for part in from..*joint {
         let id = BodyId::new(kind, body.number, Some(part));
-        joints_m.push(poses.get(&id)?.at_m);
+        joints_m.push(poses.get(&id)?.pose.at_m);
     }
     let shape = Shape::Line { points_m: joints_m, thickness_m: *thickness_m };
     Some(Body { shape, ..body.clone() })

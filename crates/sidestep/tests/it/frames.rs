@@ -7,7 +7,7 @@ use sidestep::kernel::ports::MemoryRecorder;
 use sidestep::kernel::view::{BodyId, FrameOptions, Shape};
 use sidestep::scenario::Source;
 use sidestep::worlds::airspace::airspace_run;
-use sidestep::worlds::airspace::kinds::ZONE;
+use sidestep::worlds::airspace::kinds::{AIRPLANE, ZONE};
 use sidestep::worlds::chain::chain_run;
 use sidestep::worlds::robots::kinds::{DOOR, ROBOT};
 use sidestep::worlds::robots::robots_run;
@@ -196,4 +196,65 @@ fn entries_of_the_log_say_what_happened_to_whom_with_whom_and_where() {
         }
     }
     assert!(met > 10, "{met}");
+}
+
+/// Departures, arrivals and overflights that appear one after the other.
+fn departures() -> Box<dyn Simulation> {
+    let text = "format = 1\nworld = \"airspace\"\nseed = 3\n[airspace]\nmethod = \"mvp\"\nshield = \"off\"\n\
+                dt_s = 10.0\ndtau_s = 5.0\nhorizon_s = 300.0\nvertical_m = 305.0\n\
+                [airspace.generator]\nkind = \"terminal\"\nn = 30\narrivals = 10\noverflights = 8\n\
+                radius_m = 70000.0\ndeparture_interval_s = 60.0\narrival_interval_s = 80.0\n\
+                levels_m = [3050.0, 9150.0]\nspeeds_m_s = [110.0, 160.0]\nclimbs_m_s = [6.0, 15.0]\n\
+                [airplane]\nv_m_s = 135.0\nomega_max_deg_s = 1.5\nseparation_m = 9260.0\n";
+    let source = Source::new("departures", text, "");
+    Box::new(airspace_run(&source, 1).unwrap_or_else(|e| panic!("{e}")))
+}
+
+#[test]
+fn no_airplane_has_events_before_it_appears() {
+    let mut run = departures();
+    run.enable_events();
+    let mut before = run.frame(FrameOptions::WITHOUT_SCANS);
+    let first = before.bodies.len();
+    let mut events = 0;
+    while !run.is_over() && run.cycle() < 300 {
+        run.advance(1);
+        let frame = run.frame(FrameOptions::WITHOUT_SCANS);
+        for event in &frame.log {
+            let whose = [Some(event.who), event.with];
+            for airplane in whose.into_iter().flatten() {
+                let is_there = before.bodies.iter().any(|body| body.id() == airplane);
+                assert!(is_there && event.cycle == before.cycle, "{event:?}");
+            }
+            events += 1;
+        }
+        before = frame;
+    }
+    assert!(events > 10, "{events}");
+    assert!(before.bodies.len() != first, "airplanes come and go");
+}
+
+#[test]
+fn airplanes_have_their_velocity_over_the_ground() {
+    let mut run = departures();
+    let before = run.frame(FrameOptions::WITHOUT_SCANS);
+    run.advance(1);
+    let after = run.frame(FrameOptions::WITHOUT_SCANS);
+    let mut straight = 0;
+    for body in before.bodies.iter().filter(|body| body.kind == AIRPLANE) {
+        let Some(later) = after.bodies.iter().find(|later| later.id() == body.id()) else {
+            continue;
+        };
+        assert!(body.velocity_m_s[0].hypot(body.velocity_m_s[1]) > 100.0, "{body:?}");
+        let has_turned = (body.pose.turn[3] - later.pose.turn[3]).abs() > 1e-9;
+        if has_turned {
+            continue;
+        }
+        for k in 0..2 {
+            let moved_m = later.pose.at_m[k] - body.pose.at_m[k];
+            assert!((moved_m - 10.0 * body.velocity_m_s[k]).abs() < 1.0, "{body:?} {later:?}");
+        }
+        straight += 1;
+    }
+    assert!(straight > 0);
 }

@@ -2,13 +2,14 @@
 
 use super::areas::{Area, AreaKind};
 use super::events::{Event, EventKind};
-use super::flight::{Point, Pose2};
+use super::flight::{Point, Pose2, rotated};
 use super::state::AirspaceState;
+use super::surveillance::present_state;
 use super::world::AirspaceWorld;
 use crate::kinds;
 use sidestep_kernel::view::{
-    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, EarthReference, LogEvent, Pose,
-    PositionTableColumns, Quantity, Scenery, Severity, Shape,
+    AreaLevels, Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, EarthReference, LogEvent,
+    Pose, PositionTableColumns, Quantity, Route, Scenery, Severity, Shape, TrafficPlan,
 };
 use sidestep_kernel::{Cycle, EntitySlot};
 
@@ -54,7 +55,36 @@ pub(super) fn scenery(world: &AirspaceWorld, name: &str) -> Scenery {
             chart: world.chart().earth_chart(),
             start_utc_s: world.start_utc_s,
         },
+        traffic: Some(traffic_plan(world)),
     }
+}
+
+/// Returns the levels of all areas, and the filed routes. A recorded flight has none: its track is known as it is flown.
+fn traffic_plan(world: &AirspaceWorld) -> TrafficPlan {
+    let bound_m = |level_m: f64| level_m.is_finite().then_some(level_m);
+    let mut areas = Vec::new();
+    for (number, area) in (0..).zip(world.areas.iter()) {
+        areas.push(AreaLevels {
+            area: BodyId::new(kinds::AREA, number, None),
+            is_fence: area.kind == AreaKind::In,
+            low_m: bound_m(area.levels.low_m),
+            high_m: bound_m(area.levels.high_m),
+        });
+    }
+    let mut routes = Vec::new();
+    for (id, airplane) in (0..).zip(world.airplanes.iter()) {
+        if airplane.track.is_some() || airplane.mission.is_empty() {
+            continue;
+        }
+        let places = std::iter::once(&airplane.start.at).chain(airplane.mission.iter());
+        let points_m = places.map(|&at| {
+            let [x_m, y_m] = world.display_m(at);
+            [x_m, y_m, airplane.altitude_m]
+        });
+        let agent = BodyId::new(kinds::AIRPLANE, id, None);
+        routes.push(Route { agent, points_m: points_m.collect() });
+    }
+    TrafficPlan { areas, routes }
 }
 
 /// Returns the call signs as names of bodies, and the names of areas; one without a name has none.
@@ -149,7 +179,11 @@ pub(super) fn visible_bodies(
     let ids = 0..world.airplanes.len() as EntitySlot;
     let active: Vec<EntitySlot> = ids.filter(|&id| state.is_active(world, id, now)).collect();
     let too_near = too_close_aircraft(world, state, &active);
-    let airplanes = active.iter().flat_map(|&id| airplane_and_zone(world, state, id, &too_near));
+    let airplanes = active.iter().flat_map(|&id| {
+        let is_too_near = too_near.binary_search(&id).is_ok();
+        airplane_and_zone(world, state, now, id)
+            .map(|body| body.with_condition_if(is_too_near, BodyCondition::Touching))
+    });
     let now_s = world.cycle_start_s(now);
     let is_shown = |area: &Area| !area.is_permanent() && area.lasts_at(now_s);
     airplanes.chain(area_bodies(world, now_s, is_shown)).collect()
@@ -158,21 +192,23 @@ pub(super) fn visible_bodies(
 fn airplane_and_zone(
     world: &AirspaceWorld,
     state: &AirspaceState,
+    now: Cycle,
     id: EntitySlot,
-    too_near: &[EntitySlot],
 ) -> [Body; 2] {
     let current = &state.airplanes[id as usize];
+    let vector = present_state(world, state, now, id);
     let Pose2 { at: [x_m, y_m], heading_rad } = world.display_pose(current.pose());
+    // East is another direction in another place on the earth.
+    let turn_rad = heading_rad - vector.pose.heading_rad;
+    let [east_m_s, north_m_s] = rotated(vector.velocity_m_s, turn_rad);
     let pose = Pose::from_heading([x_m, y_m, current.altitude_m.get()], heading_rad);
     let length_m = LENGTH_FRACTION * zone_radius_m(world, id);
     let dart = Shape::Dart { length_m, width_m: WIDTH_FRACTION * length_m };
-    let bodies = [
-        Body::new(kinds::AIRPLANE, id, pose, dart),
+    let velocity_m_s = [east_m_s, north_m_s, vector.climb_m_s];
+    [
+        Body::new(kinds::AIRPLANE, id, pose, dart).with_velocity(velocity_m_s),
         Body::new(kinds::ZONE, id, pose, zone_shape(world, id)),
-    ];
-    bodies.map(|body| {
-        body.with_condition_if(too_near.binary_search(&id).is_ok(), BodyCondition::Touching)
-    })
+    ]
 }
 
 /// Returns the airplanes that are nearer to another than allowed, by id.

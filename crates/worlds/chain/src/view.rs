@@ -46,6 +46,7 @@ impl<const D: usize> ChainWorld<D> {
                 .collect(),
             groups: Vec::new(),
             earth: Default::default(),
+            traffic: None,
         }
     }
 

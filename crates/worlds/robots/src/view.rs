@@ -36,6 +36,7 @@ impl RobotsWorld {
             names: Vec::new(),
             groups: self.agent_groups.clone(),
             earth: Default::default(),
+            traffic: None,
         }
     }
 

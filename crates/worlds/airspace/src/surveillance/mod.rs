@@ -38,5 +38,6 @@ mod track;
 pub use observation_counts::ObservationCounts;
 pub(crate) use observations::{GroupObservations, each_decides_by_tracks};
 pub(crate) use perceived_traffic::PerceivedTraffic;
+pub(crate) use state_report::present_state;
 pub use state_vector::{StateVector, StateVectorHistory};
 pub(crate) use track::SurveillanceTrack;

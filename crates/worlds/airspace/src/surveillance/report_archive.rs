@@ -51,7 +51,7 @@ impl<'a, 'b> ReportArchive<'a, 'b> {
             settings,
             now_step: now * world.timing.points_per_dt() as u64,
             histories: group.iter().map(|&slot| state.state_vectors(slot)).collect(),
-            present: group.iter().map(|&slot| present_state(context, slot)).collect(),
+            present: group.iter().map(|&slot| present_state(world, state, now, slot)).collect(),
             context,
             group,
         })

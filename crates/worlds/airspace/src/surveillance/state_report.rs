@@ -4,14 +4,20 @@ use super::state_vector::StateVector;
 use crate::perceive::observed_pose;
 use crate::purpose;
 use crate::scratch::PhaseContext;
-use sidestep_kernel::EntitySlot;
+use crate::state::AirspaceState;
+use crate::world::AirspaceWorld;
 use sidestep_kernel::distr::normal_pair;
 use sidestep_kernel::geometry::{add, scaled};
 use sidestep_kernel::math;
+use sidestep_kernel::{Cycle, EntitySlot};
 
 /// Returns the state of an airplane at the start of the present cycle, in which its change of level is cleared.
-pub(super) fn present_state(context: &PhaseContext<'_>, slot: EntitySlot) -> StateVector {
-    let PhaseContext { world, state, now, .. } = *context;
+pub(crate) fn present_state(
+    world: &AirspaceWorld,
+    state: &AirspaceState,
+    now: Cycle,
+    slot: EntitySlot,
+) -> StateVector {
     let current = &state.airplanes[slot as usize];
     let pose = current.pose();
     let altitude_m = current.altitude_m.get();
