@@ -23,6 +23,8 @@ export interface Frame {
   /** First point of each line, and the number of all points. */
   lineStarts: Uint32Array;
   points_m: Float32Array;
+  /** Velocity of each body in m/s, east, north and up; empty for scenes that are no traffic. */
+  velocities_m_s: Float32Array;
   conditions: Uint8Array;
   text: FrameText;
 }
@@ -36,6 +38,7 @@ interface Header {
   session: number;
   tableId: number;
   dimensions: 2 | 3;
+  hasVelocities: boolean;
   cycle: number;
   time_s: number;
   bodies: number;
@@ -59,6 +62,7 @@ function readHeader(bytes: ArrayBuffer): Header {
   if (dimensions !== 2 && dimensions !== 3) throw new FrameError(`a frame with ${dimensions} dimensions`);
   return {
     dimensions,
+    hasVelocities: view.getUint8(7) === 1,
     session: view.getUint32(8, true),
     tableId: view.getUint32(12, true),
     cycle: view.getFloat64(16, true),
@@ -75,7 +79,8 @@ function readHeader(bytes: ArrayBuffer): Header {
 function frameBytes(head: Header): number {
   const d = head.dimensions;
   const turn = d === 2 ? 1 : 4;
-  const words = head.bodies * (d + turn) + (head.lines + 1) + head.points * d;
+  const velocities = head.hasVelocities ? 3 * head.bodies : 0;
+  const words = head.bodies * (d + turn) + (head.lines + 1) + head.points * d + velocities;
   return HEADER_BYTES + 4 * words + 4 * Math.ceil(head.bodies / 4) + head.textBytes;
 }
 
@@ -106,6 +111,7 @@ export function decodeFrame(bytes: ArrayBuffer): Frame {
   at += 4 * (head.lines + 1);
   checkLines(lineStarts, head.points);
   const points_m = floats(d * head.points);
+  const velocities_m_s = floats(head.hasVelocities ? 3 * head.bodies : 0);
   const conditions = new Uint8Array(bytes, at, head.bodies);
   at += 4 * Math.ceil(head.bodies / 4);
   const text = head.textBytes === 0 ? NO_TEXT : readText(new Uint8Array(bytes, at, head.textBytes));
@@ -122,6 +128,7 @@ export function decodeFrame(bytes: ArrayBuffer): Frame {
     orientations,
     lineStarts,
     points_m,
+    velocities_m_s,
     conditions,
     text,
   };

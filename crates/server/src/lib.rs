@@ -46,6 +46,7 @@ mod session;
 mod socket;
 mod state;
 pub mod sweep_gallery;
+mod trail_history;
 mod usage;
 mod write;
 

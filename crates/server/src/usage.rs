@@ -24,6 +24,7 @@ pub(crate) struct SessionBytes {
     pub(crate) keyframes: StoreBytes,
     pub(crate) events: StoreBytes,
     pub(crate) metrics: StoreBytes,
+    pub(crate) trails: StoreBytes,
 }
 
 /// What the open sessions of a server keep, as they have told it.
@@ -53,11 +54,12 @@ impl UsageRegistry {
     pub(crate) fn stores(&self) -> Vec<StoreUsage> {
         let sessions = self.lock();
         let stores = sessions.iter().flat_map(|(&session, bytes)| {
-            let SessionBytes { keyframes, events, metrics } = *bytes;
+            let SessionBytes { keyframes, events, metrics, trails } = *bytes;
             [
                 store(Some(session), "checkpoints to seek to", keyframes),
                 store(Some(session), "events", events),
                 store(Some(session), "metrics over time", metrics),
+                store(Some(session), "places of agents, for trails", trails),
             ]
         });
         stores.collect()
@@ -127,8 +129,8 @@ mod tests {
         second.set(SessionBytes { metrics, ..SessionBytes::default() });
         let told: Vec<(Option<SessionId>, u64, u64)> =
             registry.stores().iter().map(|s| (s.session, s.bytes, s.max_bytes)).collect();
-        assert_eq!(told.len(), 6);
-        assert_eq!(told[5], (Some(4), 5, 9));
+        assert_eq!(told.len(), 8);
+        assert_eq!(told[6], (Some(4), 5, 9));
         drop((first, second));
         assert_eq!(registry.stores(), []);
     }

@@ -2,7 +2,7 @@
 // `SIDESTEP_WRITE=protocol cargo test --release -p sidestep-server protocol`. Do not edit.
 
 /** Version of requests, replies, notifications and frames together. */
-export const VERSION = 2;
+export const VERSION = 3;
 
 /**
  * A request. Its reply has the same number, which the page chooses from 1 on: 0 is that of the reply to a request
@@ -163,7 +163,15 @@ skip: number | null,
 /**
  * The largest number of events.
  */
-limit: number, } | { "do": "source", } | { "do": "tables", } | { "do": "save",
+limit: number, } | { "do": "trails",
+/**
+ * The cycle at which they end.
+ */
+until: number,
+/**
+ * The bodies; none for all agents.
+ */
+bodies: Array<BodyId>, } | { "do": "source", } | { "do": "tables", } | { "do": "save",
 /**
  * The text.
  */
@@ -402,7 +410,11 @@ left_out: number,
 /**
  * The cycle before which all events are known: of a run those so far, of a recording soon all.
  */
-known_until: number, } | { "is": "source",
+known_until: number, } | { "is": "trails",
+/**
+ * The trails.
+ */
+trails: Array<BodyTrail>, } | { "is": "source",
 /**
  * Its name in problems.
  */
@@ -862,7 +874,17 @@ groups: Array<SceneGroup>,
 /**
  * Whether a recorded run is computed again.
  */
-is_recording: boolean, };
+is_recording: boolean,
+/**
+ * What a plan view shows of traffic; none where the scene is no traffic.
+ */
+traffic: Traffic | null, };
+
+export type Traffic = { chart: EarthChart | null, level_m: number | null, areas: Array<TrafficArea>, routes: Array<TrafficRoute>, };
+export type EarthChart = { origin_deg: [number, number], sphere_radius_m: number | null, };
+export type TrafficArea = { kind: string, number: number, name: string, is_fence: boolean, low_m: number | null, high_m: number | null, };
+export type TrafficRoute = { agent: BodyId, points_m: Array<[number, number, number]>, };
+export type BodyTrail = { body: BodyId, cycles: Array<number>, points_m: Array<number>, };
 
 /**
  * Agents that the scenario describes together, such as couriers.

@@ -13,6 +13,8 @@ export interface FrameColumns {
   places: Float32Array;
   turns: Float32Array;
   lineStarts: Uint32Array;
+  /** Velocities of bodies; empty for scenes that are no traffic. */
+  velocities: Float32Array;
   conditions: Float32Array;
 }
 
@@ -32,23 +34,25 @@ function readSegment(reader: ByteReader, dimensions: 2 | 3, frames: FrameColumns
     reader.u32(),
     reader.u32(),
   ] as const;
+  const velocityCount = reader.u32();
   const lineStarts = reader.u32s(lines + 1);
-  const perFrame = [dimensions * (bodies + points), (dimensions === 2 ? 1 : 4) * bodies, bodies] as const;
-  const [places, turns, conditions] = perFrame.map((count) => decodePlane(reader, count, times)) as [
-    Float32Array,
-    Float32Array,
-    Float32Array,
-  ];
+  const placeCount = dimensions * (bodies + points);
+  const turnCount = (dimensions === 2 ? 1 : 4) * bodies;
+  const places = decodePlane(reader, placeCount, times);
+  const turns = decodePlane(reader, turnCount, times);
+  const velocities = velocityCount > 0 ? decodePlane(reader, velocityCount, times) : new Float32Array(0);
+  const conditions = decodePlane(reader, bodies, times);
   for (let time = 0; time < times; time++) {
     const at = (column: Float32Array, count: number): Float32Array => column.subarray(time * count, (time + 1) * count);
     frames.push({
       table,
       dimensions,
       bodies,
-      places: at(places, perFrame[0]),
-      turns: at(turns, perFrame[1]),
+      places: at(places, placeCount),
+      turns: at(turns, turnCount),
       lineStarts,
-      conditions: at(conditions, perFrame[2]),
+      velocities: at(velocities, velocityCount),
+      conditions: at(conditions, bodies),
     });
   }
 }
@@ -63,18 +67,19 @@ export interface FrameHead {
 
 /** The bytes of a frame, as the server would have sent them. */
 export function frameBytes(columns: FrameColumns, head: FrameHead): ArrayBuffer {
-  const { dimensions, bodies, places, turns, lineStarts, conditions } = columns;
+  const { dimensions, bodies, places, turns, lineStarts, velocities, conditions } = columns;
   const text = head.text === null ? new Uint8Array() : new TextEncoder().encode(JSON.stringify(head.text));
   const ofBodies = dimensions * bodies;
   const lines = lineStarts.length - 1;
   const points = (places.length - ofBodies) / dimensions;
-  const words = places.length + turns.length + lineStarts.length;
+  const words = places.length + turns.length + lineStarts.length + velocities.length;
   const flags = 4 * Math.ceil(bodies / 4);
   const bytes = new ArrayBuffer(HEADER_BYTES + 4 * words + flags + text.length);
   const view = new DataView(bytes);
   view.setUint32(0, MAGIC, true);
   view.setUint16(4, VERSION, true);
   view.setUint8(6, dimensions);
+  view.setUint8(7, velocities.length > 0 ? 1 : 0);
   view.setUint32(8, head.session, true);
   view.setUint32(12, columns.table, true);
   view.setFloat64(16, head.cycle, true);
@@ -89,6 +94,7 @@ export function frameBytes(columns: FrameColumns, head: FrameHead): ArrayBuffer 
   put(turns);
   put(lineStarts);
   put(places.subarray(ofBodies));
+  put(velocities);
   new Uint8Array(bytes, at, bodies).set(conditions);
   new Uint8Array(bytes, at + flags, text.length).set(text);
   return bytes;

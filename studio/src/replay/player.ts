@@ -99,6 +99,8 @@ export class ReplayPlayer {
         return this.#recording.findEvents(call);
       case "events":
         return this.#recording.events(call.from, call.until, call.skip ?? 0, call.limit);
+      case "trails":
+        return this.#recording.trails(call.until);
       case "source":
         return this.#recording.source();
       case "tables":

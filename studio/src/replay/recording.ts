@@ -18,9 +18,14 @@ import type { Parts } from "./parts";
 import { ByteReader, decodePlane } from "./plane";
 import { bodyNames, findEvents, type EventQuery } from "./search";
 import { selectTable } from "./tables";
+import { TrailCollector } from "./trail-collector";
 
 /** Number of decoded parts that are kept: a seek within them is immediate. */
 const MAX_KEPT_PARTS = 6;
+
+/** Maximum number of frames, and of points of all bodies together, of which trails are made: more are not kept. */
+const MAX_TRAIL_FRAMES = 600;
+const MAX_TRAIL_POINTS = 240_000;
 
 /** Size of the digest of a frame. */
 const DIGEST_BYTES = 16;
@@ -139,6 +144,22 @@ export class Recording {
       index -= tables;
     }
     throw new Error(`there is no body table ${id}: the file is not whole`);
+  }
+
+  /** The reply to a request for the trails of all agents up to a cycle, from the last frames before it. */
+  async trails(until: number): Promise<ReplyBody> {
+    const last = this.frameUntil(until);
+    const present = await this.table((await this.columns(last)).table);
+    const agents = present.is_agent.reduce((count, isAgent) => count + (isAgent ? 1 : 0), 0);
+    const frames = Math.min(MAX_TRAIL_FRAMES, Math.floor(MAX_TRAIL_POINTS / Math.max(1, agents)));
+    const trails = new TrailCollector(present);
+    let table = present;
+    for (let frame = Math.max(0, last - frames + 1); frame <= last; frame++) {
+      const columns = await this.columns(frame);
+      if (columns.table !== table.id) table = await this.table(columns.table);
+      trails.add(this.cycleOf(frame), columns, table);
+    }
+    return { is: "trails", trails: trails.trails };
   }
 
   /** The reply to the request for the scenario. */

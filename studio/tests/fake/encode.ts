@@ -1,6 +1,6 @@
 /** Encodes frames by the layout in the server's protocol. */
 
-import type { FrameText } from "../../src/protocol";
+import { VERSION, type FrameText } from "../../src/protocol";
 
 export interface Columns {
   session: number;
@@ -11,6 +11,8 @@ export interface Columns {
   positions_m: number[];
   orientations: number[];
   lines: number[][];
+  /** Velocities of bodies, of traffic. */
+  velocities_m_s?: number[];
   conditions: number[];
   leftOut?: number;
   text?: FrameText;
@@ -22,13 +24,21 @@ export function encodeFrame(columns: Columns): ArrayBuffer {
   const text = columns.text ? new TextEncoder().encode(JSON.stringify(columns.text)) : new Uint8Array(0);
   const points = columns.lines.flat();
   const padded = 4 * Math.ceil(n / 4);
-  const words = columns.positions_m.length + columns.orientations.length + columns.lines.length + 1 + points.length;
+  const velocities = columns.velocities_m_s ?? [];
+  const words =
+    columns.positions_m.length +
+    columns.orientations.length +
+    columns.lines.length +
+    1 +
+    points.length +
+    velocities.length;
   const bytes = new ArrayBuffer(56 + 4 * words + padded + text.length);
   const view = new DataView(bytes);
   const u32 = (at: number, value: number): void => view.setUint32(at, value, true);
   u32(0, 0x46545353);
-  view.setUint16(4, 2, true);
+  view.setUint16(4, VERSION, true);
   view.setUint8(6, d);
+  view.setUint8(7, velocities.length > 0 ? 1 : 0);
   u32(8, columns.session);
   u32(12, columns.tableId);
   view.setFloat64(16, columns.cycle, true);
@@ -48,6 +58,7 @@ export function encodeFrame(columns: Columns): ArrayBuffer {
     at += 4;
   }
   floats(points);
+  floats(velocities);
   new Uint8Array(bytes, at, n).set(columns.conditions);
   new Uint8Array(bytes, at + padded).set(text);
   return bytes;

@@ -7,7 +7,7 @@ export interface FakeWorld {
   scene: Scene;
   cyclesPlanned: number;
   table: Omit<BodyTable, "session" | "id">;
-  columns(cycle: number): Pick<Columns, "positions_m" | "orientations" | "lines" | "conditions">;
+  columns(cycle: number): Pick<Columns, "positions_m" | "orientations" | "lines" | "conditions" | "velocities_m_s">;
   events(from: number, until: number): RunEvent[];
   inspect(who: BodyId, cycle: number): Inspection;
   scans(who: BodyId, cycle: number): Scan[];
@@ -33,6 +33,26 @@ function looks(
 }
 
 const ALL_COLORS = COLORS.map((color) => looks(color, 1, 5));
+
+/** The border of an area north of the middle of the airspace. */
+const FAKE_AREA: Scene["bodies"][number] = {
+  id: { kind: "area", number: 0, part: 0 },
+  name: "EHR 4",
+  at_m: [0, 5000, 3000],
+  orientation: [0, 0, 0, 1],
+  shape: {
+    type: "line",
+    points_m: [
+      [-2000, 4500, 3000],
+      [2000, 4500, 3000],
+      [2000, 6500, 3000],
+      [-2000, 6500, 3000],
+      [-2000, 4500, 3000],
+    ],
+    thickness_m: 25,
+  },
+  appearance: { color: [60, 60, 60], opacity: 1, layer: 1 },
+};
 
 /** A pseudo-random number from 0 to 1, by two numbers. */
 function chance(a: number, b: number): number {
@@ -90,6 +110,7 @@ export function robots(count: number): FakeWorld {
       dimensions: 2,
       cycle_s: 0.1,
       is_recording: false,
+      traffic: null,
       floor: { width: side, height: side, box_m: box, origin_m: [0, 0], yaw_rad: 0, runs: runsOf(side, side, wall) },
       bodies: [
         {
@@ -281,6 +302,7 @@ export function chain(): FakeWorld {
       is_recording: false,
       groups: [],
       floor: null,
+      traffic: null,
       bodies: Array.from({ length: 80 }, (_, i) => ball(i)),
     },
     table: {
@@ -374,7 +396,13 @@ export function airplanes(): FakeWorld {
       is_recording: false,
       groups: [],
       floor: null,
-      bodies: Array.from({ length: n }, (_, i) => {
+      traffic: {
+        chart: { origin_deg: [52, 4.5], sphere_radius_m: null },
+        level_m: 3000,
+        areas: [{ kind: "area", number: 0, name: "EHR 4", is_fence: false, low_m: null, high_m: 3048 }],
+        routes: [],
+      },
+      bodies: Array.from({ length: n }, (_, i): Scene["bodies"][number] => {
         const [x, y] = at((i + n / 2) % n, 0);
         return {
           id: { kind: "goal", number: i, part: null },
@@ -384,7 +412,7 @@ export function airplanes(): FakeWorld {
           shape: { type: "cylinder", radius_m: 100, height_m: 1 },
           appearance: { color: COLORS[i % 6]!, opacity: 0.45, layer: 2 },
         };
-      }),
+      }).concat(FAKE_AREA),
     },
     table: {
       kinds: ["airplane", "zone"],
@@ -425,6 +453,8 @@ export function airplanes(): FakeWorld {
         positions_m: all.flatMap(([x, y]) => [x, y]),
         orientations: all.map(([, , h]) => h),
         lines: [],
+        // 175 m in 5 s.
+        velocities_m_s: all.flatMap(([, , h]) => [35 * Math.cos(h), 35 * Math.sin(h), 0]),
         conditions: all.map((_, i) => (i === 8 && cycle > 30 && cycle < 34 ? 3 : 0)),
       };
     },

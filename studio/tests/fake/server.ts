@@ -5,18 +5,20 @@ import { createServer, type IncomingMessage, type Server, type ServerResponse } 
 import type { AddressInfo } from "node:net";
 import { extname, join, normalize } from "node:path";
 import { WebSocketServer, type WebSocket } from "ws";
-import type {
-  FileEntry,
-  ReplyBody,
-  ServerMethod,
-  SessionMethod,
-  Fleet,
-  ServerNotification,
-  Problem,
-  ClientRequest,
-  SessionStatus,
-  OpenTarget,
-  SweepRun,
+import {
+  VERSION,
+  type BodyTrail,
+  type ClientRequest,
+  type FileEntry,
+  type Fleet,
+  type OpenTarget,
+  type Problem,
+  type ReplyBody,
+  type ServerMethod,
+  type ServerNotification,
+  type SessionMethod,
+  type SessionStatus,
+  type SweepRun,
 } from "../../src/protocol";
 import { bodyNames, findEvents } from "../../src/replay/search";
 import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
@@ -107,6 +109,26 @@ class Run {
     this.#socket = socket;
     this.seed = String(seed ?? 1);
     this.text = textOf(world.scene.world);
+  }
+
+  /** The trails of all agents up to a cycle. */
+  trails(until: number): ReplyBody {
+    const { scene, table, columns } = this.world;
+    const d = scene.dimensions;
+    const trails = table.is_agent.flatMap((isAgent, index): (BodyTrail & { index: number })[] => {
+      const part = table.part[index]!;
+      const kind = table.kinds[table.kind[index]!]!;
+      const body = { kind, number: table.number[index]!, part: part < 0 ? null : part };
+      return isAgent ? [{ body, cycles: [], points_m: [], index }] : [];
+    });
+    for (let cycle = Math.max(0, until - 600); cycle <= until; cycle++) {
+      const { positions_m } = columns(cycle);
+      for (const { index, cycles, points_m } of trails) {
+        cycles.push(cycle);
+        points_m.push(positions_m[d * index]!, positions_m[d * index + 1]!, d === 3 ? positions_m[3 * index + 2]! : 0);
+      }
+    }
+    return { is: "trails", trails: trails.map(({ body, cycles, points_m }) => ({ body, cycles, points_m })) };
   }
 
   status(): SessionStatus {
@@ -298,7 +320,7 @@ export class FakeServer {
     const say = (words: unknown): void => socket.send(JSON.stringify(words));
     say({
       notice: "hello",
-      version: 2,
+      version: VERSION,
       program: "sidestep 0.0.0 (made up)",
       worlds: Object.keys(WORLDS),
       read_only: false,
@@ -558,6 +580,8 @@ function act(call: Exclude<SessionMethod, { do: "save" }>, run: Run): ReplyBody 
       run.playing = false;
       run.goTo(run.cycle + call.cycles);
       return { is: "done" };
+    case "trails":
+      return run.trails(call.until);
     case "seek":
       run.goTo(call.cycle);
       return { is: "done" };

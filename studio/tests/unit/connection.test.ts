@@ -3,7 +3,7 @@
 import { beforeEach, expect, test } from "vitest";
 import { delayBefore_ms } from "../../src/backoff";
 import { Connection, RequestError, type Socket } from "../../src/connection";
-import type { ServerNotification } from "../../src/protocol";
+import { VERSION, type ServerNotification } from "../../src/protocol";
 
 class FakeSocket implements Socket {
   binaryType = "";
@@ -51,7 +51,14 @@ beforeEach(() => {
   connection.connect();
 });
 
-const HELLO = JSON.stringify({ notice: "hello", version: 2, program: "x", worlds: [], read_only: false, open: [] });
+const HELLO = JSON.stringify({
+  notice: "hello",
+  version: VERSION,
+  program: "x",
+  worlds: [],
+  read_only: false,
+  open: [],
+});
 
 test("waits double from a quarter of a second up to eight seconds", () => {
   expect([0, 1, 2, 3, 4, 5, 6, 50].map(delayBefore_ms)).toEqual([250, 500, 1000, 2000, 4000, 8000, 8000, 8000]);

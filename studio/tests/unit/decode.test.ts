@@ -7,9 +7,9 @@ import { encodeFrame, type Columns } from "../fake/encode";
 /** A frame of two bodies of the plane and one line of two points, written out by hand. */
 const HEX = [
   "53535446", // "SSTF"
-  "0200",
+  "0300",
   "02",
-  "00", // version 2, two dimensions
+  "00", // version 3, two dimensions, no velocities
   "07000000",
   "03000000", // session 7, table 3
   "0000000000001440",
@@ -88,8 +88,8 @@ describe("bytes that are no frame are refused", () => {
   test.each([
     ["shorter than a header", HEX.slice(0, 100), /shorter than its header/],
     ["with other magic", `00${HEX.slice(2)}`, /not a frame/],
-    ["of another version", HEX.replace("0200", "0300"), /version 3/],
-    ["with four dimensions", HEX.replace("020002", "020004"), /4 dimensions/],
+    ["of another version", HEX.replace("0300", "0400"), /version 4/],
+    ["with four dimensions", HEX.replace("030002", "030004"), /4 dimensions/],
     ["cut off at the end", HEX.slice(0, -2), /its header says/],
     ["with bytes too many", `${HEX}00`, /its header says/],
     ["whose text is not JSON", HEX.slice(0, -4) + "ffff", /not JSON/],

@@ -65,7 +65,7 @@ test("listed and raw planes are exact", () => {
 function chunk(frames: number): Uint8Array {
   const later = Array.from({ length: frames - 1 }, () => 2);
   const rest = later.map(() => 0);
-  const bytes = new Bytes().u32(1).u32(1, frames, 2, 1, 2).u32(0, 2);
+  const bytes = new Bytes().u32(1).u32(1, frames, 2, 1, 2).u32(0).u32(0, 2);
   bytes.u8(1, 0, 1, 1, 0).u32(0, 0, 0, 0, 0, 0, 0, 0);
   bytes.u8(...later, ...rest, ...rest, ...rest, ...later, ...rest, ...rest, ...rest);
   bytes
@@ -159,6 +159,7 @@ function replayText(): string {
           bodies: [],
           groups: [],
           is_recording: true,
+          traffic: null,
         },
         status,
         digest: "abc",

@@ -3,7 +3,14 @@
 import { beforeEach, expect, test, vi } from "vitest";
 import type { Socket } from "../../src/connection";
 import type { AccessStatus } from "../../src/auth";
-import type { ServerMethod, SessionMethod, ServerNotification, Scene, SessionStatus } from "../../src/protocol";
+import {
+  VERSION,
+  type ServerMethod,
+  type SessionMethod,
+  type ServerNotification,
+  type Scene,
+  type SessionStatus,
+} from "../../src/protocol";
 import { encodeFrame } from "../fake/encode";
 import { draftOf } from "../../src/edit/draft.svelte";
 import { Studio } from "../../src/state/studio.svelte";
@@ -52,7 +59,7 @@ class FakeSocket implements Socket {
 
   greet(): void {
     this.onopen!();
-    this.sendToPage({ notice: "hello", version: 2, program: "x", worlds: [], read_only: false, open: [] });
+    this.sendToPage({ notice: "hello", version: VERSION, program: "x", worlds: [], read_only: false, open: [] });
   }
   sendToPage(words: unknown): void {
     this.onmessage?.({ data: JSON.stringify(words) });

@@ -57,7 +57,7 @@ impl BodySet {
                 kind,
                 number,
                 part,
-                moves: body.is_moving(),
+                moves: is_moved_obstacle(body),
                 shape,
             });
         }
@@ -75,7 +75,7 @@ impl BodySet {
         member.kind == body.kind
             && member.number == body.number
             && member.part == body.part
-            && member.moves == body.is_moving()
+            && member.moves == is_moved_obstacle(body)
             && self.forms[member.shape as usize] == shape_key(&body.shape, self.is_flat)
     }
 
@@ -119,6 +119,11 @@ impl BodySet {
             is_agent: self.members.iter().map(|member| member.kind.is_agent()).collect(),
         }
     }
+}
+
+/// Returns whether a body is an obstacle that moves. The velocities of traffic are in the frames: they change no table.
+fn is_moved_obstacle(body: &Body) -> bool {
+    body.kind == BodyKind::OBSTACLE && body.is_moving()
 }
 
 /// Returns all different items in the order in which they first occur, and the number of each item among them.

@@ -11,6 +11,8 @@ pub(crate) struct FrameColumns {
     pub(crate) places: Vec<f32>,
     /// Headings, or components of quaternions.
     pub(crate) turns: Vec<f32>,
+    /// Velocities of bodies, east, north and up; of traffic only.
+    pub(crate) velocities: Vec<f32>,
     /// First point of each line, and the number of all points.
     pub(crate) line_starts: Vec<u32>,
     /// Conditions of bodies, as numbers of their own.
@@ -40,8 +42,9 @@ impl FrameColumns {
         let turns = floats(words(bodies * if d == 2 { 1 } else { 4 })).collect();
         let line_starts = words(lines + 1);
         places.extend(floats(words(d * points)));
+        let velocities = floats(words(if bytes[7] == 1 { 3 * bodies } else { 0 })).collect();
         let conditions = bytes[at..at + bodies].iter().map(|&code| f32::from(code)).collect();
-        Self { table: word(12), places, turns, line_starts, conditions }
+        Self { table: word(12), places, turns, velocities, line_starts, conditions }
     }
 
     /// Returns whether the columns of two frames stand for the same bodies and points.

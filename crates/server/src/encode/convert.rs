@@ -1,12 +1,13 @@
 //! Views of the kernel as types of the protocol.
 
 use crate::protocol::{
-    Appearance, BodyId, OccupancyGrid, Problem, RunEvent, Scan, Scene, SceneGroup, Shape,
-    StaticBody,
+    Appearance, BodyId, EarthChart, OccupancyGrid, Problem, RunEvent, Scan, Scene, SceneGroup,
+    Shape, StaticBody, Traffic, TrafficArea, TrafficRoute,
 };
 use sidestep_kernel::InputError;
 use sidestep_kernel::view::{
-    self, AgentGroup, Body, Kinds, LogEvent, Occupancy, Scenery, Severity,
+    self, AgentGroup, Body, BodyKind, BodyRole, EarthProjection, Kinds, LogEvent, Occupancy,
+    Scenery, Severity,
 };
 
 /// Returns the scene of a world, which stays the same, by the world's name and its noun for an agent.
@@ -21,6 +22,7 @@ pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: b
         bodies: scenery.bodies.iter().map(|body| static_body(body, scenery)).collect(),
         groups: scenery.groups.iter().map(group).collect(),
         is_recording,
+        traffic: scenery.traffic.as_ref().map(|plan| traffic(plan, scenery)),
     }
 }
 
@@ -33,12 +35,53 @@ fn group(group: &AgentGroup) -> SceneGroup {
     }
 }
 
-fn static_body(body: &Body, scenery: &Scenery) -> StaticBody {
+fn traffic(plan: &view::TrafficPlan, scenery: &Scenery) -> Traffic {
+    let mut starts = scenery.bodies.iter();
+    let start = starts.find(|body| matches!(body.kind.role(), BodyRole::StartOf(_)));
+    let is_on_one_level = scenery.dimensions == 2;
+    Traffic {
+        chart: scenery.earth.chart.map(earth_chart),
+        level_m: start.filter(|_| is_on_one_level).map(|body| body.pose.at_m[2]),
+        areas: plan.areas.iter().map(|area| traffic_area(area, scenery)).collect(),
+        routes: plan.routes.iter().map(traffic_route).collect(),
+    }
+}
+
+fn earth_chart(chart: view::EarthChart) -> EarthChart {
+    let sphere_radius_m = match chart.projection {
+        EarthProjection::AzimuthalEquidistant => None,
+        EarthProjection::Equirectangular { radius_m } => Some(radius_m),
+    };
+    EarthChart { origin_deg: chart.origin_deg, sphere_radius_m }
+}
+
+fn traffic_area(levels: &view::AreaLevels, scenery: &Scenery) -> TrafficArea {
+    let view::BodyId { kind, number, .. } = levels.area;
+    let name = own_name(scenery, kind, number);
+    TrafficArea {
+        kind: kind.name().into(),
+        number,
+        name: name.unwrap_or_else(|| format!("{} {number}", kind.spec().noun)),
+        is_fence: levels.is_fence,
+        low_m: levels.low_m,
+        high_m: levels.high_m,
+    }
+}
+
+fn traffic_route(route: &view::Route) -> TrafficRoute {
+    TrafficRoute { agent: body_id(&route.agent), points_m: route.points_m.clone() }
+}
+
+fn own_name(scenery: &Scenery, kind: BodyKind, number: u32) -> Option<String> {
     let mut names = scenery.names.iter();
-    let own = names.find(|(kind, number, _)| *kind == body.kind && *number == body.number);
+    let own = names.find(|(named, its_number, _)| *named == kind && *its_number == number);
+    own.map(|(_, _, name)| name.clone())
+}
+
+fn static_body(body: &Body, scenery: &Scenery) -> StaticBody {
     StaticBody {
         id: body_id(&body.id()),
-        name: own.map(|(_, _, name)| name.clone()),
+        name: own_name(scenery, body.kind, body.number),
         at_m: body.pose.at_m,
         orientation: body.pose.turn,
         shape: shape(&body.shape),

@@ -5,7 +5,7 @@ mod columns;
 mod convert;
 
 pub(crate) use columns::FrameColumns;
-pub(crate) use convert::{event, problem, requested_body, scan, scene};
+pub(crate) use convert::{body_id, event, problem, requested_body, scan, scene};
 
 use crate::protocol::{BodyTable, FrameText, SessionId, VERSION};
 use body_set::BodySet;
@@ -21,6 +21,8 @@ const HEADER_BYTES: usize = 56;
 pub struct FrameEncoder {
     session: SessionId,
     dimensions: u8,
+    /// Whether frames have the velocities of bodies.
+    has_velocities: bool,
     names: BTreeMap<(BodyKind, u32), String>,
     body_set: Option<BodySet>,
     tables: u32,
@@ -30,7 +32,14 @@ impl FrameEncoder {
     /// Creates an encoder for a run with this scenery, whose first frame begins a body table.
     pub fn new(session: SessionId, scenery: &Scenery) -> Self {
         let names = BTreeMap::new();
-        let mut encoder = Self { session, dimensions: 2, names, body_set: None, tables: 0 };
+        let mut encoder = Self {
+            session,
+            dimensions: 2,
+            has_velocities: false,
+            names,
+            body_set: None,
+            tables: 0,
+        };
         encoder.restart(scenery);
         encoder
     }
@@ -42,6 +51,7 @@ impl FrameEncoder {
             self.names.insert((*kind, *number), name.clone());
         }
         self.dimensions = scenery.dimensions;
+        self.has_velocities = scenery.traffic.is_some();
         self.body_set = None;
     }
 
@@ -71,7 +81,8 @@ impl FrameEncoder {
         let lines: Vec<&[[f64; 3]]> = bodies.iter().filter_map(line_points).collect();
         let count: usize = lines.iter().map(|points| points.len()).sum();
         let d = usize::from(self.dimensions);
-        let floats = (d + if d == 2 { 1 } else { 4 }) * bodies.len() + d * count;
+        let velocities = if self.has_velocities { 3 * bodies.len() } else { 0 };
+        let floats = (d + if d == 2 { 1 } else { 4 }) * bodies.len() + d * count + velocities;
         let flags = bodies.len().next_multiple_of(4);
         let size = HEADER_BYTES + 4 * (floats + lines.len() + 1) + flags + text.len();
         let mut out = Vec::with_capacity(size);
@@ -87,6 +98,9 @@ impl FrameEncoder {
             &mut out,
             lines.iter().copied().flatten().flat_map(|at_m| at_m.iter().copied().take(d)),
         );
+        if self.has_velocities {
+            put_column(&mut out, bodies.iter().flat_map(|body| body.velocity_m_s));
+        }
         out.extend(bodies.iter().map(|body| condition_code(body.state)));
         out.resize(out.len() + flags - bodies.len(), 0);
         out.extend_from_slice(text);
@@ -97,7 +111,7 @@ impl FrameEncoder {
     fn put_header(&self, out: &mut Vec<u8>, frame: &Frame, counts: [u32; 4], left_out: u32) {
         out.extend(MAGIC.to_le_bytes());
         out.extend((VERSION as u16).to_le_bytes());
-        out.extend([self.dimensions, 0]);
+        out.extend([self.dimensions, u8::from(self.has_velocities)]);
         out.extend(self.session.to_le_bytes());
         out.extend(self.tables.to_le_bytes());
         out.extend((frame.cycle as f64).to_le_bytes());

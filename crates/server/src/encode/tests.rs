@@ -4,7 +4,7 @@ use super::*;
 use crate::protocol::Scan;
 use sidestep::worlds::chain::kinds::RODS;
 use sidestep::worlds::robots::kinds::{DOOR, ROBOT};
-use sidestep_kernel::view::{BODY_COLORS, Pose};
+use sidestep_kernel::view::{BODY_COLORS, Pose, TrafficPlan};
 
 fn scenery(dimensions: u8) -> Scenery {
     Scenery {
@@ -16,6 +16,7 @@ fn scenery(dimensions: u8) -> Scenery {
         names: vec![(ROBOT, 1, "Anna".into())],
         groups: Vec::new(),
         earth: Default::default(),
+        traffic: None,
     }
 }
 
@@ -66,7 +67,7 @@ fn a_frame_of_a_plane_has_the_documented_layout() {
     let (table, bytes) = encoder.encode(&frame(bodies), &NOTHING, 5);
     let mut read = Reader(&bytes);
     assert_eq!(read.take(), *b"SSTF");
-    assert_eq!(read.take(), [2, 0, 2, 0], "version, dimensions");
+    assert_eq!(read.take(), [3, 0, 2, 0], "version, dimensions, no velocities");
     assert_eq!(read.u32s(), [9, 1], "session, table");
     assert_eq!((read.f64(), read.f64()), (7.0, 3.5));
     let text = br#"{"scans":[],"events":[],"events_left_out":0}"#;
@@ -106,6 +107,24 @@ fn a_frame_of_space_has_quaternions_and_points_of_lines() {
 }
 
 #[test]
+fn frames_of_traffic_have_velocities_after_the_points() {
+    let traffic = Some(TrafficPlan::default());
+    let bodies = vec![robot(0, [1.0, 2.0, 0.5], 0.0).with_velocity([3.0, 4.0, 5.0])];
+    let (_, bytes) = FrameEncoder::new(1, &Scenery { traffic, ..scenery(2) }).encode(
+        &frame(bodies),
+        &NOTHING,
+        0,
+    );
+    assert_eq!(bytes[7], 1);
+    let mut read = Reader(&bytes[56..]);
+    assert_eq!(read.f32s(), [1.0, 2.0, 0.0]);
+    assert_eq!(read.u32s(), [0], "no line");
+    assert_eq!(read.f32s(), [3.0, 4.0, 5.0]);
+    assert_eq!(read.take(), [0; 4], "conditions, padded");
+    assert_eq!(FrameColumns::from_frame(&bytes).velocities, [3.0, 4.0, 5.0]);
+}
+
+#[test]
 fn every_column_starts_at_a_multiple_of_four_bytes() {
     for n in 0..9 {
         let bodies = (0..n).map(|k| robot(k, [0.0; 3], 0.0)).collect();
@@ -126,8 +145,16 @@ fn a_cast_stays_while_bodies_move_and_changes_with_who_they_are() {
     assert_eq!(begins(two()), Some(3));
     let wider = Shape::Cylinder { radius_m: 0.5, height_m: 1.0 };
     assert_eq!(begins(vec![Body { shape: wider, ..robot(0, [0.0; 3], 0.0) }]), Some(4));
-    let pushed = robot(0, [0.0; 3], 0.0).with_velocity([1.0, 0.0, 0.0]);
-    assert_eq!(begins(vec![pushed]), Some(5));
+    let ball = |east_m_s: f64| Body {
+        kind: BodyKind::OBSTACLE,
+        velocity_m_s: [east_m_s, 0.0, 0.0],
+        ..robot(0, [0.0; 3], 0.0)
+    };
+    assert_eq!(begins(vec![ball(0.0)]), Some(5));
+    assert_eq!(begins(vec![ball(1.0)]), Some(6), "obstacles that move look different");
+    let pushed = |east_m_s: f64| robot(0, [0.0; 3], 0.0).with_velocity([east_m_s, 0.0, 0.0]);
+    assert_eq!(begins(vec![pushed(0.0)]), Some(7));
+    assert_eq!(begins(vec![pushed(1.0)]), None, "the velocity of traffic is in its frames");
 }
 
 #[test]

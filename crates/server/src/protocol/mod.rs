@@ -9,7 +9,7 @@
 //! TypeScript's types are generated from these (`studio/src/protocol/types.ts`, see `typescript.rs`). A frame is
 //! little-endian; every column starts at a multiple of 4 bytes, so typed arrays can view it without a copy:
 //! ```text
-//!  0 u32  magic 0x46545353 ("SSTF")      4 u16 version     6 u8 dimensions (2|3)    7 u8 0
+//!  0 u32  magic 0x46545353 ("SSTF")      4 u16 version     6 u8 dimensions (2|3)    7 u8 1 with velocities, else 0
 //!  8 u32  session                       12 u32 table (the body table that the columns follow)
 //! 16 f64  cycle                         24 f64 time_s
 //! 32 u32  bodies (n)                    36 u32 lines (k)   40 u32 points of all lines (p)
@@ -18,6 +18,7 @@
 //!    f32[n]      heading in rad (d = 2); f32[4n] quaternion x y z w (d = 3)
 //!    u32[k+1]    first point of each line, in the order of the bodies that are lines
 //!    f32[d*p]    the points
+//!    f32[3n]     velocity of each body, in meters per second; of traffic only
 //!    u8[n]       condition: 0 plain 1 leading 2 open 3 touching 4 failed; padded to 4
 //!    u8[t]       FrameText as JSON: scans and events, which are few
 //! ```
@@ -33,6 +34,7 @@ mod replay;
 mod reply;
 mod request;
 mod scene;
+mod traffic;
 #[cfg(test)]
 mod typescript;
 
@@ -54,9 +56,10 @@ pub use scene::{
     Appearance, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, SceneGroup, Shape,
     StaticBody,
 };
+pub use traffic::{BodyTrail, EarthChart, Traffic, TrafficArea, TrafficRoute};
 
 /// Version of requests, replies, notifications and frames together.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// A session's number, as the server gave it.
 pub type SessionId = u32;

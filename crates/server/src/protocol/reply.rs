@@ -1,6 +1,6 @@
 //! The server's messages: replies, and notices without a request.
 
-use super::{BodyTable, Fleet, RunEvent, Scene, SessionId, Speed};
+use super::{BodyTable, BodyTrail, Fleet, RunEvent, Scene, SessionId, Speed};
 use serde::Serialize;
 use sidestep_kernel::view::Inspection;
 use sidestep_scenario::Editing;
@@ -116,6 +116,11 @@ pub enum ReplyBody {
         left_out: u64,
         /// The cycle before which all events are known: of a run those so far, of a recording soon all.
         known_until: f64,
+    },
+    /// The trails of some bodies, as far as they are known.
+    Trails {
+        /// The trails.
+        trails: Vec<BodyTrail>,
     },
     /// The scenario's text.
     Source {

@@ -209,6 +209,13 @@ pub enum RunMethod {
         /// The largest number of events.
         limit: u32,
     },
+    /// Asks for the trails of bodies up to a cycle, as far as the cycles before it have been computed.
+    Trails {
+        /// The cycle at which they end.
+        until: u64,
+        /// The bodies; none for all agents.
+        bodies: Vec<BodyId>,
+    },
     /// Asks for the scenario's text.
     Source {},
     /// Asks for the names of the tables of a recording, which can be exported.
@@ -229,7 +236,7 @@ pub enum RunMethod {
 
 impl RunMethod {
     /// The names of all methods.
-    pub const NAMES: [&str; 15] = [
+    pub const NAMES: [&str; 16] = [
         "play",
         "pause",
         "step",
@@ -242,6 +249,7 @@ impl RunMethod {
         "agent-metrics",
         "find-events",
         "events",
+        "trails",
         "source",
         "tables",
         "save",

@@ -1,6 +1,6 @@
 //! Everything visible: the static scene, the table of moving bodies, and the text of frames.
 
-use super::{BodyId, SessionId};
+use super::{BodyId, SessionId, Traffic};
 use serde::Serialize;
 
 /// The scene, which stays the same.
@@ -25,6 +25,8 @@ pub struct Scene {
     pub groups: Vec<SceneGroup>,
     /// Whether a recorded run is computed again.
     pub is_recording: bool,
+    /// What a plan view shows of traffic; none where the scene is no traffic.
+    pub traffic: Option<Traffic>,
 }
 
 /// Agents that the scenario describes together, such as couriers.

@@ -103,7 +103,8 @@ fn decode_chunk(bytes: &[u8], d: usize) -> Vec<FrameColumns> {
         for ((places, turns), conditions) in places.into_iter().zip(turns).zip(conditions) {
             let table = table as u32;
             let line_starts = line_starts.clone();
-            frames.push(FrameColumns { table, places, turns, line_starts, conditions });
+            let velocities = Vec::new();
+            frames.push(FrameColumns { table, places, turns, velocities, line_starts, conditions });
         }
     }
     assert_eq!(at, bytes.len());

@@ -2,7 +2,7 @@
 //! events of a recording are known, any cycle is near a keyframe, and the digest is confirmed, before the run was played
 //! to its end.
 
-use super::history::RunHistory;
+use super::history::{ComputedCycles, RunHistory};
 use super::pace::CyclesPerSlice;
 use sidestep_kernel::series::SeriesInterval;
 use sidestep_kernel::view::FrameOptions;
@@ -37,12 +37,15 @@ impl AheadRun {
     /// Advances for some milliseconds. Returns the run once it is at its end.
     pub(super) fn advance_slice(&mut self, history: &mut RunHistory) -> Option<&dyn Simulation> {
         self.skip_computed_cycles(history);
-        let cycles = self.pace.cycles().min(self.until.saturating_sub(self.run.cycle()));
+        let left = self.until.saturating_sub(self.run.cycle());
+        let until_sample = history.trails.cycles_until_due(self.run.cycle());
+        let cycles = self.pace.cycles().min(left).min(until_sample);
         let started = Instant::now();
         let done = self.run.advance(cycles);
         let computing_time = started.elapsed();
         self.pace.adapt_cycles_per_slice(done, computing_time);
-        history.record(self.run.as_mut(), computing_time);
+        let computed = ComputedCycles { count: done, computing_time, is_played: false };
+        history.record(self.run.as_mut(), &computed);
         let is_at_end = self.run.cycle() >= self.until || self.run.is_over() || done == 0;
         if is_at_end || self.events_taken.elapsed() >= EVENTS_INTERVAL {
             history.log.record_ahead(&mut self.run.frame(FrameOptions::WITHOUT_SCANS));

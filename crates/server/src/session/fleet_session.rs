@@ -11,6 +11,7 @@ use crate::protocol::{
     Problem, Reply, ReplyBody, ReplyResult, RunMethod, ServerNotification, SessionId, SessionState,
     SessionStatus, Speed,
 };
+use crate::trail_history::TrailHistory;
 use crate::usage::{SessionBytes, UsageEntry};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::Frame;
@@ -37,6 +38,7 @@ pub(super) struct FleetSession {
     fleet_scene: Arc<FleetScene>,
     publisher: SessionUpdatePublisher,
     log: EventStore,
+    trails: TrailHistory,
     /// The newest frame.
     frame: Frame,
     /// The number of the newest view; 0 before the first.
@@ -62,6 +64,7 @@ impl FleetSession {
             fleet_scene,
             publisher,
             log: EventStore::default(),
+            trails: TrailHistory::default(),
             frame: Frame::default(),
             number: 0,
             known_until: 0,
@@ -122,6 +125,7 @@ impl FleetSession {
         self.frame.log.retain(|entry| entry.cycle >= self.known_until);
         self.known_until = self.frame.cycle;
         self.log.record(&mut self.frame);
+        self.trails.push(&self.frame, Duration::ZERO);
         self.usage.set(SessionBytes { events: self.log.bytes(), ..SessionBytes::default() });
         snapshot
     }
@@ -165,6 +169,7 @@ impl FleetSession {
                 let cycle = self.frame.cycle as f64;
                 Ok(ReplyBody::AgentMetrics { names: Vec::new(), cycle, values: Vec::new() })
             }
+            RunMethod::Trails { until, bodies } => Ok(self.trails.trails_reply(until, &bodies)),
             RunMethod::Tables {} => Ok(ReplyBody::Tables { names: Vec::new() }),
             RunMethod::Play { .. }
             | RunMethod::Pause {}

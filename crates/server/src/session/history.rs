@@ -1,12 +1,14 @@
-//! What a session keeps of a run as it advances: keyframes to seek to, metrics over time, and events.
+//! What a session keeps of a run as it advances: keyframes to seek to, metrics over time, events, and trails.
 
 use super::open_run::OpenRun;
 use crate::event_store::EventStore;
 use crate::keyframes::Keyframes;
 use crate::metric_history::MetricHistory;
 use crate::protocol::Problem;
+use crate::trail_history::TrailHistory;
 use crate::usage::SessionBytes;
-use sidestep_kernel::Simulation;
+use sidestep_kernel::view::FrameOptions;
+use sidestep_kernel::{Cycle, Simulation};
 use std::time::{Duration, Instant};
 
 /// The history of one run. Each cycle is recorded by the computation that gets there first: the played one, or the
@@ -15,6 +17,15 @@ pub(super) struct RunHistory {
     pub(super) keyframes: Keyframes,
     pub(super) metrics: MetricHistory,
     pub(super) log: EventStore,
+    pub(super) trails: TrailHistory,
+}
+
+/// Cycles that a run has just computed.
+pub(super) struct ComputedCycles {
+    pub(super) count: Cycle,
+    pub(super) computing_time: Duration,
+    /// Whether the page is shown the run, and hears of its events with the next frame.
+    pub(super) is_played: bool,
 }
 
 impl RunHistory {
@@ -29,16 +40,34 @@ impl RunHistory {
             keyframes: Keyframes::new(open.keyframe_budget()),
             metrics: MetricHistory::from_run(open.run.as_mut(), open.until, recorded, words),
             log: EventStore::default(),
+            trails: TrailHistory::default(),
         };
         history.add_keyframe(open.run.as_ref());
+        history.sample_trails(open.run.as_mut(), true);
         Ok(history)
     }
 
-    /// Records a run that has advanced for some computing time: its metrics, and a keyframe where one is due.
-    pub(super) fn record(&mut self, run: &mut dyn Simulation, computing_time: Duration) {
+    /// Records a run that has advanced: its metrics, and a keyframe and places for trails where they are due.
+    pub(super) fn record(&mut self, run: &mut dyn Simulation, computed: &ComputedCycles) {
         self.metrics.add(&run.take_series());
-        if self.keyframes.is_due(run.cycle(), computing_time) {
+        if self.keyframes.is_due(run.cycle(), computed.computing_time) {
             self.add_keyframe(run);
+        }
+        self.trails.add_computing_time(computed.count, computed.computing_time);
+        if self.trails.is_due(run.cycle()) {
+            self.sample_trails(run, computed.is_played);
+        }
+    }
+
+    fn sample_trails(&mut self, run: &mut dyn Simulation, is_played: bool) {
+        let started = Instant::now();
+        let mut frame = run.frame(FrameOptions::WITHOUT_SCANS);
+        self.trails.push(&frame, started.elapsed());
+        // A frame takes the events out of the simulation.
+        if is_played {
+            self.log.record(&mut frame);
+        } else {
+            self.log.record_ahead(&mut frame);
         }
     }
 
@@ -48,6 +77,7 @@ impl RunHistory {
             keyframes: self.keyframes.bytes(),
             events: self.log.bytes(),
             metrics: self.metrics.bytes(),
+            trails: self.trails.bytes(),
         }
     }
 

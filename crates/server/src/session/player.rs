@@ -5,7 +5,7 @@ mod viewers;
 
 use super::ahead_run::AheadRun;
 use super::foxglove::FoxgloveLease;
-use super::history::RunHistory;
+use super::history::{ComputedCycles, RunHistory};
 use super::inspect::inspection;
 use super::open_run::OpenRun;
 use super::pace::{CycleRate, CyclesPerSlice};
@@ -213,6 +213,9 @@ impl Player {
                 let limit = limit.min(MAX_EVENTS);
                 Ok(self.history.log.events_reply(from..until, skip.unwrap_or(0), limit))
             }
+            RunMethod::Trails { until, bodies } => {
+                Ok(self.history.trails.trails_reply(until, &bodies))
+            }
             RunMethod::Source {} => Ok(self.source_reply()),
             RunMethod::Tables {} => {
                 self.open_run.table_names().map(|names| ReplyBody::Tables { names })
@@ -352,7 +355,9 @@ impl Player {
 
     /// Advances for some milliseconds, but not beyond the target cycle.
     fn advance_slice(&mut self, target: Cycle) {
-        let cycles = self.slice.cycles().min(target.saturating_sub(self.cycle()));
+        let until_sample = self.history.trails.cycles_until_due(self.cycle());
+        let left = target.saturating_sub(self.cycle());
+        let cycles = self.slice.cycles().min(left).min(until_sample);
         if cycles == 0 || self.open_run.run.is_over() {
             return;
         }
@@ -363,7 +368,8 @@ impl Player {
         self.rate.record(Instant::now(), done);
         self.publisher.mark_cycle_changed();
         self.digest = None;
-        self.history.record(self.open_run.run.as_mut(), computing_time);
+        let computed = ComputedCycles { count: done, computing_time, is_played: true };
+        self.history.record(self.open_run.run.as_mut(), &computed);
     }
 
     /// Computes a recording ahead for some milliseconds; returns whether there was anything left to compute.

@@ -3,8 +3,8 @@
 use super::Plan;
 use super::units::ground_speed_m_s;
 use crate::picture::AgentEmphasis;
-use crate::picture::bodies::pale;
 use crate::picture::canvas::Px;
+use crate::picture::palette::pale;
 use crate::style::hex;
 use crate::svg::{Svg, SvgNumber};
 use sidestep_kernel::math::hypot;
