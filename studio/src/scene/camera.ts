@@ -31,16 +31,21 @@ export interface Camera {
   project(x: number, y: number, z: number): [number, number, boolean];
 }
 
+/** Above and below all that a scene has, of which nothing is clipped: aircraft fly at ten thousand meters. */
+const EYE_HEIGHT_M = 1e6;
+
 export class PlaneCamera implements Camera {
-  readonly threeCamera = new OrthographicCamera(-1, 1, 1, -1, 0, 2000);
+  readonly threeCamera = new OrthographicCamera(-1, 1, 1, -1, 0, 2 * EYE_HEIGHT_M);
   mPerPx = 0.05;
+  /** Height of a part at the lower edge that is covered by something else: the scene is fitted above it. */
+  covered_px = 0;
   x = 0;
   y = 0;
   #width = 1;
   #height = 1;
 
   constructor() {
-    this.threeCamera.position.z = 1000;
+    this.threeCamera.position.z = EYE_HEIGHT_M;
   }
 
   resize(width_px: number, height_px: number): void {
@@ -53,8 +58,9 @@ export class PlaneCamera implements Camera {
     this.x = (lo[0] + hi[0]) / 2;
     this.y = (lo[1] + hi[1]) / 2;
     const wide = (hi[0] - lo[0]) / Math.max(40, this.#width - 90);
-    const high = (hi[1] - lo[1]) / Math.max(40, this.#height - 70);
+    const high = (hi[1] - lo[1]) / Math.max(40, this.#height - this.covered_px - 70);
     this.mPerPx = Math.max(wide, high, 1e-5);
+    this.y -= 0.5 * this.covered_px * this.mPerPx;
     this.#update();
   }
 
@@ -114,7 +120,7 @@ export class PlaneCamera implements Camera {
     const [halfW, halfH] = [(this.#width / 2) * this.mPerPx, (this.#height / 2) * this.mPerPx];
     const camera = this.threeCamera;
     [camera.left, camera.right, camera.top, camera.bottom] = [-halfW, halfW, halfH, -halfH];
-    camera.position.set(this.x, this.y, 1000);
+    camera.position.set(this.x, this.y, EYE_HEIGHT_M);
     camera.updateProjectionMatrix();
     camera.updateMatrixWorld();
   }

@@ -17,6 +17,13 @@ export interface Label {
 
 const FONT = "12px system-ui, 'DejaVu Sans', sans-serif";
 
+/** Words of a special kind of view, in place of axes and scale bar. */
+export interface WordLayer {
+  /** Changes whenever the words do. */
+  readonly key: string;
+  draw(pen: CanvasRenderingContext2D): void;
+}
+
 export class Overlay {
   readonly canvas: HTMLCanvasElement;
   readonly #pen: CanvasRenderingContext2D;
@@ -38,7 +45,13 @@ export class Overlay {
   }
 
   /** Draws only after a change: an unchanged canvas costs the browser nothing. */
-  draw(camera: Camera, extent: Extent, labels: readonly Label[], palette: Palette): void {
+  draw(
+    camera: Camera,
+    extent: Extent,
+    labels: readonly Label[],
+    palette: Palette,
+    layer: WordLayer | null = null,
+  ): void {
     const state = JSON.stringify([
       camera.project(0, 0, 0),
       camera.project(1, 2, 3),
@@ -46,6 +59,7 @@ export class Overlay {
       extent,
       labels,
       palette.isDark,
+      layer?.key,
     ]);
     if (state === this.#drawn) return;
     this.#drawn = state;
@@ -53,9 +67,11 @@ export class Overlay {
     pen.clearRect(0, 0, this.#width, this.#height);
     pen.font = FONT;
     pen.textBaseline = "middle";
-    if (camera instanceof PlaneCamera) this.#planeAxes(camera, palette);
+    if (layer) layer.draw(pen);
+    else if (camera instanceof PlaneCamera) this.#planeAxes(camera, palette);
     else this.#spaceAxes(camera, extent, palette);
-    this.#scaleBar(camera, palette);
+    if (!layer) this.#scaleBar(camera, palette);
+    pen.font = FONT;
     for (const label of labels) this.#label(label, palette);
   }
 

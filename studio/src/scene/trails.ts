@@ -1,4 +1,6 @@
-/** Trails of bodies: a ring buffer of past positions for each, kept by the page. */
+/** Trails of bodies: a ring buffer of past positions for each, kept by the page and completed by the server. */
+
+import type { BodyTrail } from "../protocol";
 
 /** Maximum number of stored points, of all bodies together and of one. */
 const MAX_POINTS = 240_000;
@@ -20,6 +22,8 @@ export class Trails {
   #last = -Infinity;
   /** The interval of frames in cycles; shrinks slowly, because a pause ends on a shorter one. */
   #stride = 0;
+  /** Whether positions before the last frame were never displayed, and have to be asked for. */
+  #hasGap = false;
 
   constructor(bodies: number, dimensions: 2 | 3) {
     this.bodies = bodies;
@@ -31,6 +35,16 @@ export class Trails {
     this.#counts = new Int32Array(bodies);
   }
 
+  /** Whether the trails lack positions before the last frame. */
+  get hasGap(): boolean {
+    return this.#hasGap;
+  }
+
+  /** The cycle of the last frame. */
+  get lastCycle(): number {
+    return this.#last;
+  }
+
   /**
    * Adds the positions of a frame. Going back shortens trails; a jump forward clears them if it was a seek, or if it is
    * much wider than the last interval: a faster run makes wider intervals, too.
@@ -40,6 +54,8 @@ export class Trails {
     const maxGap = isSought ? MAX_GAP_CYCLES : Math.max(MAX_GAP_CYCLES, MAX_GAP_GROWTH * this.#stride);
     if (gap < 0) this.#cut(cycle);
     else if (gap > maxGap) this.clear();
+    // A seek skips positions, as does the first frame of a run that is not at its start.
+    if (gap > maxGap || (isSought && gap > 1)) this.#hasGap = cycle > 0;
     if (!isSought && Number.isFinite(gap)) this.#stride = Math.max(gap, this.#stride / 2);
     this.#last = cycle;
     for (let body = 0; body < this.bodies; body++) this.#push(body, cycle, places);
@@ -50,6 +66,38 @@ export class Trails {
     this.#counts.fill(0);
   }
 
+  /** Takes over the trails of bodies that were there before under other numbers; `indexOf` returns the new ones. */
+  adopt(before: Trails, indexOf: (body: number) => number | undefined): void {
+    this.#last = before.#last;
+    this.#stride = before.#stride;
+    this.#hasGap = before.#hasGap;
+    for (let body = 0; body < before.bodies; body++) {
+      const to = indexOf(body);
+      if (to === undefined) continue;
+      const points = before.points(body);
+      const cycles = before.#cyclesOf(body);
+      for (let i = Math.max(0, points.length - this.length); i < points.length; i++)
+        this.#append(to, cycles[i]!, points[i]!, 0);
+    }
+  }
+
+  /** Replaces the trails of some bodies up to a cycle, and keeps what was displayed since. */
+  load(trails: readonly BodyTrail[], until: number, indexOf: (trail: BodyTrail) => number | undefined): void {
+    for (const trail of trails) {
+      const body = indexOf(trail);
+      if (body === undefined) continue;
+      const points = this.points(body);
+      const cycles = this.#cyclesOf(body);
+      const known = trail.cycles.findLastIndex((cycle) => cycle <= until);
+      this.#begins[body] = this.#counts[body] = 0;
+      for (let i = Math.max(0, known + 1 - this.length); i <= known; i++)
+        this.#append(body, trail.cycles[i]!, trail.points_m, 3 * i);
+      const last = trail.cycles[known] ?? -Infinity;
+      for (let i = 0; i < points.length; i++) if (cycles[i]! > last) this.#append(body, cycles[i]!, points[i]!, 0);
+    }
+    this.#hasGap = false;
+  }
+
   #push(body: number, cycle: number, places: Float32Array): void {
     const d = this.dimensions;
     const count = this.#counts[body]!;
@@ -57,6 +105,14 @@ export class Trails {
     const newest = first + ((this.#begins[body]! + count - 1 + this.length) % this.length);
     const from = body * d;
     if (count > 0 && this.#isAt(newest, from, places)) return;
+    this.#append(body, cycle, places, from);
+  }
+
+  /** Appends the place that begins at an index of a list. */
+  #append(body: number, cycle: number, places: ArrayLike<number>, from: number): void {
+    const d = this.dimensions;
+    const count = this.#counts[body]!;
+    const first = body * this.length;
     let slot: number;
     if (count < this.length) {
       slot = first + ((this.#begins[body]! + count) % this.length);
@@ -84,15 +140,18 @@ export class Trails {
     }
   }
 
+  #cyclesOf(body: number): number[] {
+    return this.#slots(body).map((slot) => this.#cycles[slot]!);
+  }
+
+  #slots(body: number): number[] {
+    const first = body * this.length;
+    return Array.from({ length: this.#counts[body]! }, (_, i) => first + ((this.#begins[body]! + i) % this.length));
+  }
+
   /** The points of a body, from the oldest to the newest, as x y (z). */
   points(body: number): number[][] {
     const d = this.dimensions;
-    const first = body * this.length;
-    const points: number[][] = [];
-    for (let i = 0; i < this.#counts[body]!; i++) {
-      const slot = first + ((this.#begins[body]! + i) % this.length);
-      points.push(Array.from(this.#places.subarray(slot * d, slot * d + d)));
-    }
-    return points;
+    return this.#slots(body).map((slot) => Array.from(this.#places.subarray(slot * d, slot * d + d)));
   }
 }

@@ -2,10 +2,10 @@
 
 import { Color, Group, Scene as Graph, SRGBColorSpace, WebGLRenderer, type Mesh } from "three";
 import type { Frame } from "../decode";
-import type { Inspection, Point3, MarkRole, Scene, BodyId } from "../protocol";
+import type { BodyTrail, Inspection, Point3, MarkRole, Scene, BodyId } from "../protocol";
 import type { Bodies } from "../state/bodies";
 import type { Link } from "../fleet/links";
-import type { TrailMode } from "../state/display.svelte";
+import type { Projection, TrailMode } from "../state/display.svelte";
 import { PlaneCamera, SpaceCamera, type Extent, type Camera } from "./camera";
 import { BodyColors, type ColorOptions } from "./body-colors";
 import type { ColorLegend } from "./coloring";
@@ -17,9 +17,13 @@ import { drawMarks, drawScans, fillAreas } from "./marks";
 import { Overlay, type Label } from "./overlay";
 import { paletteOf, ROLES, visibleColor, packColor, type Palette } from "./palette";
 import { pick } from "./pick";
+import { isPlan, PlanPainter, SYMBOL_PX } from "./plan";
+import { planOf, type PlanState, type PlanView } from "./plan-view";
 import { PlanePainter } from "./plane";
+import { profileHeight_px } from "./profile";
 import { SpacePainter } from "./space";
 import { Strokes } from "./strokes";
+import { bodiesWithTrails, drawTrail } from "./trail-lines";
 import { Trails } from "./trails";
 
 /** Draws the bodies of one kind of world. */
@@ -30,7 +34,7 @@ export interface Painter {
   frame(frame: Frame): void;
   /** Sets colors for bodies instead of their own, none for those with 0, and whether agents are left out. */
   setColors?(tints: Uint32Array | null, hidesAgents: boolean): void;
-  scale(pxPerM: number, palette: Palette, height_px: number): void;
+  scale(pxPerM: number, palette: Palette, height_px: number, width_px: number): void;
   dispose(): void;
 }
 
@@ -44,6 +48,8 @@ export interface ViewOptions extends ColorOptions {
   follows: boolean;
   /** Pairs that hear each other in a fleet, by the bodies' indices. */
   links: readonly Link[];
+  /** Whether a plan has a vertical profile below it. */
+  hasProfile: boolean;
 }
 
 /** Pixels of an image for each of the page: text and lines stay sharp in print. */
@@ -72,9 +78,10 @@ function createRenderer(canvas: HTMLCanvasElement, isSpace: boolean): WebGLRende
 }
 
 /** Returns the painter of a scene's bodies, and its floor. */
-function createLayers(scene: Scene): [Painter, FloorLayer | null] {
-  const painter = scene.dimensions === 2 ? new PlanePainter(scene) : new SpacePainter(scene);
-  return [painter, scene.floor ? new FloorLayer(scene.floor) : null];
+function createLayers(scene: Scene, projection: Projection): [Painter, FloorLayer | null] {
+  const floor = scene.floor ? new FloorLayer(scene.floor) : null;
+  if (isPlan(scene, projection)) return [new PlanPainter(scene), floor];
+  return [scene.dimensions === 2 ? new PlanePainter(scene) : new SpacePainter(scene), floor];
 }
 
 /** Returns whether a camera of one scene fits another. */
@@ -94,13 +101,17 @@ export class Viewport {
   onMoved: () => void = () => undefined;
   /** Also called after each draw: overlays follow the camera. */
   readonly drawListeners = new Set<() => void>();
+  /** Called when trails are shown and lack positions before a cycle, which were never displayed. */
+  onTrailGap: (cycle: number) => void = () => undefined;
   /** Number of draws so far. */
   pictures = 0;
+  readonly #projection: Projection;
   readonly #renderer: WebGLRenderer;
   readonly #overlay: Overlay;
   readonly #graph = new Graph();
   readonly #areas = new Group();
   #painter: Painter;
+  #plan: PlanView | null;
   #floor: FloorLayer | null;
   readonly #grid = new Strokes(1);
   readonly #trailStrokes = new Strokes(4);
@@ -122,6 +133,7 @@ export class Viewport {
     density: "auto",
     agentValues: null,
     links: [],
+    hasProfile: true,
   };
   #hovered: number | undefined;
   #extent: Extent;
@@ -135,16 +147,25 @@ export class Viewport {
   #viewChanged = true;
   #roles: ReadonlySet<MarkRole> = new Set();
 
-  constructor(canvas: HTMLCanvasElement, overlay: HTMLCanvasElement, scene: Scene, isDark: boolean, camera?: Camera) {
-    this.#renderer = createRenderer(canvas, scene.dimensions === 3);
+  constructor(
+    canvas: HTMLCanvasElement,
+    overlay: HTMLCanvasElement,
+    scene: Scene,
+    isDark: boolean,
+    camera?: Camera,
+    projection: Projection = "plan",
+  ) {
+    const isPlane = scene.dimensions === 2 || isPlan(scene, projection);
+    this.#projection = projection;
+    this.#renderer = createRenderer(canvas, !isPlane);
     this.#renderer.setPixelRatio(screenRatio());
     this.#overlay = new Overlay(overlay);
     this.#scene = scene;
     this.#palette = paletteOf(isDark);
-    const isPlane = scene.dimensions === 2;
     this.#isFitted = camera !== undefined && camera instanceof PlaneCamera === isPlane;
     this.camera = this.#isFitted ? camera! : isPlane ? new PlaneCamera() : new SpaceCamera();
-    [this.#painter, this.#floor] = createLayers(scene);
+    [this.#painter, this.#floor] = createLayers(scene, projection);
+    this.#plan = planOf(this.#painter, scene);
     if (this.#floor) this.#graph.add(this.#floor.mesh, this.#floor.walls);
     for (const strokes of [this.#grid, this.#trailStrokes, this.#marks]) this.#graph.add(strokes.quads.mesh);
     this.#graph.add(this.#painter.group, this.#areas);
@@ -171,7 +192,8 @@ export class Viewport {
     this.#floor?.dispose();
     this.#graph.remove(this.#painter.group);
     if (this.#floor) this.#graph.remove(this.#floor.mesh, this.#floor.walls);
-    [this.#painter, this.#floor] = createLayers(scene);
+    [this.#painter, this.#floor] = createLayers(scene, this.#projection);
+    this.#plan = planOf(this.#painter, scene);
     this.#graph.add(this.#painter.group);
     if (this.#floor) this.#graph.add(this.#floor.mesh, this.#floor.walls);
     if (this.#bodies) this.#painter.setBodies(this.#bodies, this.#palette);
@@ -185,14 +207,17 @@ export class Viewport {
     this.#renderer.setSize(width_px, height_px, false);
     this.#overlay.resize(width_px, height_px, screenRatio());
     this.camera.resize(width_px, height_px);
+    this.#reserveProfile();
     if (!this.#isFitted || this.#isWhole) this.camera.fit(this.#extent);
     this.requestDraw();
   }
 
   setBodies(bodies: Bodies): void {
+    const [before, trails] = [this.#bodies, new Trails(bodies.count, this.#scene.dimensions === 2 ? 2 : 3)];
+    // Whenever a body comes or goes, the others get other numbers.
+    if (before && this.#trails) trails.adopt(this.#trails, (index) => bodies.find(before.bodyId(index)));
     this.#bodies = bodies;
-    const dimensions = this.#scene.dimensions === 2 ? 2 : 3;
-    this.#trails = new Trails(bodies.count, dimensions);
+    this.#trails = trails;
     this.#dropColors();
     this.#colors = new BodyColors(bodies, this.#scene);
     this.#graph.add(this.#colors.density.mesh);
@@ -207,6 +232,7 @@ export class Viewport {
     this.#frame = frame;
     this.#trails?.push(frame.cycle, frame.positions_m, isSought);
     this.#colors?.push(frame, isSought);
+    this.#completeTrails();
     if (isFirst) this.#extent = extentOf(this.#scene, this.#bodies, frame);
     if (isFirst && !this.#isFitted) this.fit();
     this.#follow();
@@ -214,11 +240,48 @@ export class Viewport {
     this.requestDraw();
   }
 
+  /** Has the trails completed, if they are shown and have a gap. */
+  #completeTrails(): void {
+    const trails = this.#trails;
+    if (trails?.hasGap && this.#options.trails !== "none") this.onTrailGap(trails.lastCycle);
+  }
+
+  /** Takes trails up to a cycle, as the server knows them. */
+  loadTrails(received: readonly BodyTrail[], until: number): void {
+    // The run has gone back since: these end later.
+    if (!this.#trails || this.#trails.lastCycle < until) return;
+    this.#trails.load(received, until, ({ body }) => this.#bodies?.find(body));
+    this.#marksChanged = true;
+    this.requestDraw();
+  }
+
   setOptions(options: ViewOptions): void {
+    const hadTrails = this.#options.trails !== "none";
     this.#options = options;
+    if (!hadTrails) this.#completeTrails();
+    this.#reserveProfile();
+    this.#focus();
     this.#marksChanged = true;
     this.#follow();
     this.requestDraw();
+  }
+
+  /** Tells a plan which aircraft are in focus. */
+  #focus(): void {
+    this.#plan?.painter.setFocus(this.#options.selected, this.#hovered);
+  }
+
+  /** The height of the profile below a plan. */
+  get #profile_px(): number {
+    const hasOne = this.#plan !== null && this.#scene.dimensions === 3 && this.#options.hasProfile;
+    return hasOne ? profileHeight_px(this.#size[1]) : 0;
+  }
+
+  /** Fits the scene above the profile. */
+  #reserveProfile(): void {
+    if (!(this.camera instanceof PlaneCamera) || this.camera.covered_px === this.#profile_px) return;
+    this.camera.covered_px = this.#profile_px;
+    if (this.#isWhole) this.camera.fit(this.#extent);
   }
 
   /** Centers the selected body, if the view follows it. */
@@ -296,7 +359,13 @@ export class Viewport {
   hover(index: number | undefined): void {
     if (index === this.#hovered) return;
     this.#hovered = index;
+    this.#focus();
     this.requestDraw();
+  }
+
+  /** Number of data blocks of a plan; null of other views. */
+  get dataBlocks(): number | null {
+    return this.#plan?.dataBlocks ?? null;
   }
 
   /** The image as shown, with its text and its legend, as PNG of twice the size. */
@@ -366,13 +435,15 @@ export class Viewport {
     if (this.#frame) this.#drawBodies(this.#frame);
     if (this.#marksChanged) this.#drawMarks();
     if (this.#viewChanged) {
-      this.#painter.scale(pxPerM, this.#palette, this.#size[1]);
+      this.#painter.scale(pxPerM, this.#palette, this.#size[1], this.#size[0]);
       for (const strokes of [this.#grid, this.#trailStrokes, this.#marks]) strokes.scale(pxPerM, ...this.#size);
-      if (!this.#floor) drawGrid(this.#grid, this.camera, this.#extent, this.#size, this.#palette);
+      if (this.#plan) this.#plan.drawGrid(this.#grid, this.#planState(this.#plan));
+      else if (!this.#floor) drawGrid(this.#grid, this.camera, this.#extent, this.#size, this.#palette);
     }
     this.#bodiesChanged = this.#marksChanged = this.#viewChanged = false;
     this.#renderer.render(this.#graph, this.camera.threeCamera);
-    this.#overlay.draw(this.camera, this.#extent, this.#labels(), this.#palette);
+    const words = this.#plan?.wordLayer(this.#planState(this.#plan)) ?? null;
+    this.#overlay.draw(this.camera, this.#extent, this.#labels(), this.#palette, words);
     this.pictures++;
     this.onDrawn(this.#roles);
     for (const listener of this.drawListeners) listener();
@@ -394,6 +465,21 @@ export class Viewport {
     this.onLegend(colors.legend);
   }
 
+  /** The state of the view that the words of a plan depend on. */
+  #planState(plan: PlanView): PlanState {
+    const { selected, inspection } = this.#options;
+    return {
+      camera: this.camera as PlaneCamera,
+      palette: this.#palette,
+      size_px: this.#size,
+      profile_px: this.#profile_px,
+      selected: selected ? plan.painter.bodies?.find(selected) : undefined,
+      hovered: this.#hovered,
+      inspection: selected ? inspection : null,
+      frame: this.#frame,
+    };
+  }
+
   #drawMarks(): void {
     const { inspection, selected } = this.#options;
     this.#drawTrails();
@@ -401,7 +487,10 @@ export class Viewport {
     this.#marks.begin();
     const marks = selected && inspection ? inspection.marks : [];
     for (const mesh of fillAreas(marks, this.#palette)) this.#areas.add(mesh);
-    const roles = drawMarks(marks, this.#marks, this.#palette);
+    // A plan draws marks at single places as rings, which cover no aircraft.
+    const drawn = this.#plan ? marks.filter(({ shape }) => shape.type !== "point") : marks;
+    const roles = drawMarks(drawn, this.#marks, this.#palette);
+    for (const { role } of marks) roles.add(role);
     const scans = selected && this.#frame ? this.#frame.text.scans : [];
     for (const role of drawScans(scans, this.#marks, this.#palette)) roles.add(role);
     this.#drawLinks();
@@ -437,33 +526,13 @@ export class Viewport {
   #drawTrails(): void {
     const [bodies, trails] = [this.#bodies, this.#trails];
     this.#trailStrokes.begin();
-    if (bodies && trails) for (const index of this.#bodiesWithTrails(bodies)) this.#drawTrail(bodies, trails, index);
-    this.#trailStrokes.end();
-  }
-
-  #bodiesWithTrails(bodies: Bodies): Iterable<number> {
-    if (this.#options.trails === "all") return bodies.agents;
-    const index = this.#options.selected ? bodies.find(this.#options.selected) : undefined;
-    return this.#options.trails === "selected" && index !== undefined ? [index] : [];
-  }
-
-  /** A trail fades toward its old end. */
-  #drawTrail(bodies: Bodies, trails: Trails, index: number): void {
-    const { table } = bodies;
-    const points = trails.points(index);
-    const own = table.appearances[table.appearance[index]!]![0].color;
-    const color = visibleColor(this.#colors?.colorOf(index) ?? own, this.#palette);
-    const width_m = this.#options.widthIsTrue ? 2 * flatRadiusOf(table.shapes[table.shape[index]!]!) : 0;
-    const maxAlpha = this.#options.widthIsTrue ? 0.35 : 0.85;
-    for (let i = 1; i < points.length; i++) {
-      this.#trailStrokes.piece(
-        points[i - 1]!,
-        points[i]!,
-        1.5,
-        width_m,
-        packColor(color, maxAlpha * (0.12 + (0.88 * i) / points.length)),
-      );
+    if (bodies && trails) {
+      const { selected, widthIsTrue, trails: mode } = this.#options;
+      const colorOf = (index: number) => this.#colors?.colorOf(index) ?? null;
+      const style = { bodies, trails, palette: this.#palette, widthIsTrue, colorOf };
+      for (const index of bodiesWithTrails(bodies, mode, selected)) drawTrail(this.#trailStrokes, index, style);
     }
+    this.#trailStrokes.end();
   }
 
   #labels(): Label[] {
@@ -472,7 +541,8 @@ export class Viewport {
     const selected = this.#options.selected ? bodies.find(this.#options.selected) : undefined;
     const rings = new Map<number, Label["ring"]>();
     const { namedAgents: named } = bodies;
-    if (named.length <= MAX_LABELS) for (const [index] of named) rings.set(index, null);
+    // Data blocks have the names in a plan.
+    if (!this.#plan && named.length <= MAX_LABELS) for (const [index] of named) rings.set(index, null);
     if (this.#hovered !== undefined) rings.set(this.#hovered, "hovered");
     if (selected !== undefined) rings.set(selected, "selected");
     return [...rings].flatMap(([index, ring]) => this.#label(bodies, index, ring));
@@ -483,6 +553,9 @@ export class Viewport {
     if (!at) return [];
     const [x_px, y_px, inFront] = this.camera.project(...at);
     const radius_px = flatRadiusOf(bodies.table.shapes[bodies.table.shape[index]!]!) / this.camera.mPerPx;
-    return inFront ? [{ x_px, y_px, radius_px, words: ring ? bodies.name(index) : bodies.wholeName(index), ring }] : [];
+    if (!inFront) return [];
+    // In a plan, where symbols keep their size, the data block has the name.
+    if (this.#plan) return [{ x_px, y_px, radius_px: SYMBOL_PX, words: "", ring }];
+    return [{ x_px, y_px, radius_px, words: ring ? bodies.name(index) : bodies.wholeName(index), ring }];
   }
 }

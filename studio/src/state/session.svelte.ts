@@ -17,6 +17,7 @@ import { Playback } from "./playback.svelte";
 import { RunState } from "./run-state.svelte";
 import { Selection } from "./selection.svelte";
 import { SessionClient, type SessionHost } from "./session-client.svelte";
+import { TrailSource } from "./trail-source";
 
 type Opened = Extract<ReplyBody, { is: "opened" }>;
 
@@ -36,6 +37,7 @@ export class Session {
   readonly metrics = new Metrics();
   readonly agentMetrics = new AgentMetrics();
   readonly display = new Display();
+  readonly trailSource: TrailSource;
   /** The state when the connection was lost, until it is restored. */
   #resumeState: { cycle: number; isPlaying: boolean; seed: number | null } | null = null;
 
@@ -50,6 +52,7 @@ export class Session {
       },
     });
     this.playback = new Playback(this.client, this.run, this.frames, !this.isFleet);
+    this.trailSource = new TrailSource(this.client);
     this.selection = new Selection(this.client, this.frames, !this.isFleet);
   }
 
@@ -207,6 +210,7 @@ export class Session {
     this.#cancelWaits();
     this.frames.dispose();
     this.selection.dispose();
+    this.trailSource.dispose();
   }
 
   #onStart({ scene, status }: Pick<Opened, "scene" | "status">): void {
