@@ -146,7 +146,9 @@ export class PlanWords {
     const ink = css(areaColor(palette));
     pen.textAlign = "center";
     return painter.areas.flatMap(({ area, low_m, high_m }): Rect[] => {
-      const [x, y] = camera.project(0.5 * (low_m[0] + high_m[0]), 0.5 * (low_m[1] + high_m[1]));
+      // In the middle of a fence is what it encloses: its words stand below its upper edge.
+      const y_m = area.is_fence ? high_m[1] - 1.6 * LINE_PX * camera.mPerPx : 0.5 * (low_m[1] + high_m[1]);
+      const [x, y] = camera.project(0.5 * (low_m[0] + high_m[0]), y_m);
       const limits = levelRange(this.#units, area.low_m, area.high_m);
       pen.font = BOLD;
       const half = 0.5 * Math.max(pen.measureText(area.name).width, pen.measureText(limits).width);

@@ -227,7 +227,8 @@ export class Viewport {
 
   /** Shows a frame; after a seek it need not follow the previous one. */
   frame(frame: Frame, isSought = false): void {
-    if (frame === this.#frame || !this.#bodies) return;
+    // A frame may come before its body table is set: its columns belong to other bodies.
+    if (frame === this.#frame || frame.tableId !== this.#bodies?.table.id) return;
     const isFirst = this.#frame === null;
     this.#frame = frame;
     this.#trails?.push(frame.cycle, frame.positions_m, isSought);
@@ -256,9 +257,9 @@ export class Viewport {
   }
 
   setOptions(options: ViewOptions): void {
-    const hadTrails = this.#options.trails !== "none";
+    const before = this.#options.trails;
     this.#options = options;
-    if (!hadTrails) this.#completeTrails();
+    if (options.trails !== before) this.#completeTrails();
     this.#reserveProfile();
     this.#focus();
     this.#marksChanged = true;

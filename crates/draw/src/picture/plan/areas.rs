@@ -107,7 +107,10 @@ pub(super) fn draw_labels(svg: &mut Svg, plan: &Plan<'_>, areas: &[DrawnArea<'_>
     let mut taken: Vec<Rect> = Vec::new();
     for area in areas {
         let [(left, top), (right, bottom)] = bounds_px(plan, area);
-        let middle = (0.5 * (left + right), 0.5 * (top + bottom));
+        // In the middle of a fence is what it encloses: its words stand below its upper edge.
+        let middle_y =
+            if area.levels.is_fence { top + 2.0 * size_px } else { 0.5 * (top + bottom) };
+        let middle = (0.5 * (left + right), middle_y);
         let limits = plan.units.level_range(area.levels.low_m, area.levels.high_m);
         let lines = [area.name.as_str(), limits.as_str()];
         let widths = lines.map(|line| text::width(line, size_px, Weight::Bold));

@@ -124,7 +124,9 @@ fn the_middle_of_a_chart_is_where_its_latitude_and_longitude_cross() {
     let tick = svg.lines().find(|line| line.contains(">52\u{b0}00\u{2032}N<")).expect("52 degrees");
     // Text is drawn by its baseline, a third of a letter below its middle.
     let middle = number(tick, "y") - 0.365 * number(tick, "font-size");
-    assert!((middle - number(symbol, "y1")).abs() < 0.5, "{tick} {symbol}");
+    // At the western edge, 40 km away, the parallel lies 160 m farther north on the chart.
+    let off = number(symbol, "y1") - middle;
+    assert!((0.5..3.0).contains(&off), "{off}: {tick} {symbol}");
     let tick = svg.lines().find(|line| line.contains(">4\u{b0}30\u{2032}E<")).expect("4.5 degrees");
     assert!((number(tick, "x") - number(symbol, "x1")).abs() < 0.5, "{tick} {symbol}");
 }
