@@ -880,12 +880,6 @@ is_recording: boolean,
  */
 traffic: Traffic | null, };
 
-export type Traffic = { chart: EarthChart | null, level_m: number | null, areas: Array<TrafficArea>, routes: Array<TrafficRoute>, };
-export type EarthChart = { origin_deg: [number, number], sphere_radius_m: number | null, };
-export type TrafficArea = { kind: string, number: number, name: string, is_fence: boolean, low_m: number | null, high_m: number | null, };
-export type TrafficRoute = { agent: BodyId, points_m: Array<[number, number, number]>, };
-export type BodyTrail = { body: BodyId, cycles: Array<number>, points_m: Array<number>, };
-
 /**
  * Agents that the scenario describes together, such as couriers.
  */
@@ -1072,6 +1066,100 @@ names: Array<[number, string]>,
  * The bodies that are agents, which can be inspected.
  */
 is_agent: Array<boolean>, };
+
+/**
+ * What a plan view of traffic shows beside its bodies.
+ */
+export type Traffic = {
+/**
+ * Where on earth places are; none where they are in a plane of their own.
+ */
+chart: EarthChart | null,
+/**
+ * The altitude of all traffic, in meters, where all of it is on one level.
+ */
+level_m: number | null,
+/**
+ * The areas.
+ */
+areas: Array<TrafficArea>,
+/**
+ * The routes as they are filed.
+ */
+routes: Array<TrafficRoute>, };
+
+/**
+ * A map of the earth: x east and y north of its origin, in meters.
+ */
+export type EarthChart = {
+/**
+ * Latitude and longitude of the origin, in degrees.
+ */
+origin_deg: [number, number],
+/**
+ * Radius in meters of a sphere whose longitudes are as long as at the origin; none where each place lies as far
+ * from the origin, and in the direction, in which it is on the WGS84 ellipsoid.
+ */
+sphere_radius_m: number | null, };
+
+/**
+ * An area, whose borders are bodies of this kind and number.
+ */
+export type TrafficArea = {
+/**
+ * The kind of its borders.
+ */
+kind: string,
+/**
+ * Its number.
+ */
+number: number,
+/**
+ * Its name.
+ */
+name: string,
+/**
+ * Whether traffic stays inside of it, not outside.
+ */
+is_fence: boolean,
+/**
+ * The lowest altitude, in meters; none where it begins at the ground.
+ */
+low_m: number | null,
+/**
+ * The highest altitude, in meters; none where it has no end.
+ */
+high_m: number | null, };
+
+/**
+ * A route as it is filed.
+ */
+export type TrafficRoute = {
+/**
+ * The agent.
+ */
+agent: BodyId,
+/**
+ * Its start and its way-points, in meters.
+ */
+points_m: Array<[number, number, number]>, };
+
+/**
+ * The trail of a body up to a cycle.
+ */
+export type BodyTrail = {
+/**
+ * The body.
+ */
+body: BodyId,
+/**
+ * The cycles of its points, the earliest first.
+ */
+cycles: Array<number>,
+/**
+ * Its points, in meters: x, y and z of each in turn.
+ */
+points_m: Array<number>, };
 
 /**
  * A run of a sweep.
