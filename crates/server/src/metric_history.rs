@@ -202,3 +202,38 @@ impl MetricHistory {
 fn known(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep::worlds::WORLDS;
+    use sidestep_scenario::Source;
+
+    const ROBOTS: &str = "format = 1\nworld = \"robots\"\nseed = 5\ncycles = 20000\n[map]\nbox_size_m = 0.25\nascii = \"\"\"\n\
+    ..............\n..............\n....##........\n....##........\n..............\n..............\n\"\"\"\n\
+    [robots]\ncount = 6\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n[people]\ncount = 2\n";
+
+    fn present_cycle(history: &mut MetricHistory, run: &dyn Simulation, is_advancing: bool) -> f64 {
+        match history.metrics_reply(run, 0, is_advancing) {
+            ReplyBody::Metrics { present: Some(row), .. } => row.cycle,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn dear_metrics_of_a_running_cycle_are_computed_seldom_and_those_of_a_pause_at_once() {
+        let source = Source::new("s.toml", ROBOTS, "");
+        let mut run = WORLDS.compile(&source).expect("valid").start(&source, 1);
+        let words = MetricWords::default();
+        let mut history = MetricHistory::from_run(run.as_mut(), 20_000, None, words);
+        run.advance(7);
+        assert_eq!(present_cycle(&mut history, run.as_ref(), true), 7.0, "the first are computed");
+        history.present.as_mut().expect("some").cost = Duration::from_secs(3600);
+        run.advance(5);
+        assert_eq!(present_cycle(&mut history, run.as_ref(), true), 7.0, "they took an hour");
+        assert_eq!(present_cycle(&mut history, run.as_ref(), false), 12.0);
+        history.present.as_mut().expect("some").cost = Duration::ZERO;
+        run.advance(1);
+        assert_eq!(present_cycle(&mut history, run.as_ref(), true), 13.0, "they cost nothing");
+    }
+}

@@ -86,24 +86,20 @@ fn nothing_is_kept_of_sessions_that_were_closed() {
 }
 
 #[test]
-fn metrics_of_a_running_cycle_are_computed_seldom_and_those_of_a_pause_are_exact() {
+fn metrics_are_exact_where_a_run_pauses_between_two_rows() {
     let text = ROBOTS.replace("cycles = 600", "cycles = 10000000");
     let (mut page, _) = Page::open(&text, 1);
     page.ask(json!({ "do": "seek", "cycle": 12_345 }));
     let charts = page.ask(json!({ "do": "metrics", "from": 0 }));
     assert_eq!(charts["present"]["cycle"], 12_345.0, "no row is due there, and it is exact");
     page.ask(json!({ "do": "play", "speed": "fastest" }));
-    let mut cycles = std::collections::BTreeSet::new();
-    for _ in 0..200 {
+    for _ in 0..20 {
         let charts = page.ask(json!({ "do": "metrics", "from": 0 }));
-        let present = charts["present"]["cycle"].as_f64().expect("a cycle");
-        assert!(present >= 12_345.0);
-        cycles.insert(present as u64);
+        assert!(charts["present"]["cycle"].as_f64().expect("a cycle") >= 12_345.0);
     }
     page.ask(json!({ "do": "pause" }));
     let charts = page.ask(json!({ "do": "metrics", "from": 0 }));
     let paused = page.ask(json!({ "do": "events", "from": 0, "until": 1, "limit": 1 }));
     let known_until = paused["known_until"].as_f64();
     assert_eq!(charts["present"]["cycle"].as_f64(), known_until, "where it pauses");
-    assert!(cycles.len() < 200, "not one for each request");
 }
