@@ -1,7 +1,9 @@
 //! A small picture of a run: its last frame, with the tracks that led to it.
 
 use crate::Error;
-use sidestep_draw::{AnimationFrame, AnimationRenderer, bodies_with_trails};
+use sidestep_draw::{
+    AnimationFrame, AnimationLook, AnimationRenderer, TrailChoice, bodies_with_trails,
+};
 use sidestep_kernel::view::{BodyId, Frame, FrameOptions, Scenery, Trail, Vec3};
 use sidestep_kernel::{Cycle, Simulation};
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,8 +36,9 @@ impl Thumbnail {
             self.in_view.push(frame.clone());
         }
         self.frames += 1;
+        let all = TrailChoice::default();
         let with_trails: BTreeSet<BodyId> =
-            bodies_with_trails(&self.scenery, frame).into_iter().collect();
+            bodies_with_trails(&self.scenery, frame, &all).into_iter().collect();
         for body in frame.bodies.iter().filter(|body| with_trails.contains(&body.id())) {
             if self.tracks.len() >= MAX_TRACKS && !self.tracks.contains_key(&body.id()) {
                 continue;
@@ -66,7 +69,8 @@ impl Thumbnail {
         });
         let trails: Vec<Trail> = trails.collect();
         self.in_view.push(last.clone());
-        let view = AnimationRenderer::new(self.scenery, &self.in_view, width_px)?;
+        let look = AnimationLook::longer_side(width_px);
+        let view = AnimationRenderer::new(self.scenery, &self.in_view, &look)?;
         Ok(view.render(&last, &trails, "")?)
     }
 }
