@@ -208,9 +208,9 @@ impl Simulation {
         self.with_run(py, |run| {
             let simulation = run.simulation_mut();
             let frame = simulation.frame(FrameOptions::WITHOUT_SCANS);
-            AgentNumber::check_all(&look.trails.agents, &frame.bodies)
-                .map_err(|e| argument_error("agents", e.cause(), e.remedy()))?;
             let scenery = simulation.scenery();
+            AgentNumber::check_all(&look.trails.agents, &scenery, &frame.bodies)
+                .map_err(|e| argument_error("agents", e.cause(), e.remedy()))?;
             // Without a floor the view is that of the present state, which a kept renderer has not.
             let is_kept = scenery.floor.is_some();
             let mut kept = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);

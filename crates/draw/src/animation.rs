@@ -9,8 +9,8 @@ use sidestep_kernel::view::{Frame, Scenery, Trail, Vec3};
 use crate::error::DrawError;
 use crate::picture::canvas::{Camera, Canvas};
 use crate::picture::{
-    PictureView, PlanFilm, Scene, TrailChoice, animation_bounds, best_camera, check_content,
-    check_view, film_altitudes_m, projected_bounds,
+    PictureView, PlanAnimation, Scene, TrailChoice, animation_altitudes_m, animation_bounds,
+    best_camera, check_content, check_view, projected_bounds,
 };
 use crate::raster::parse;
 use crate::svg::{Anchor, Rect, Svg, TextStyle};
@@ -58,7 +58,7 @@ pub struct AnimationRenderer {
     canvas: Canvas,
     window: Rect,
     /// The plan view of traffic.
-    plan: Option<PlanFilm>,
+    plan: Option<PlanAnimation>,
     background: Pixmap,
 }
 
@@ -80,15 +80,15 @@ impl AnimationRenderer {
         let is_plan = scenery.traffic.is_some() && look.view.is_from_above();
         let usual = || if is_plan { Camera::ABOVE } else { usual_camera(&scenery, frames) };
         let camera = look.view.camera().unwrap_or_else(usual);
-        let altitudes_m = film_altitudes_m(&scenery, box_m);
+        let altitudes_m = animation_altitudes_m(&scenery, box_m);
         let below_px =
-            if is_plan { PlanFilm::profile_room_px(look.size, altitudes_m) } else { 0.0 };
+            if is_plan { PlanAnimation::profile_room_px(look.size, altitudes_m) } else { 0.0 };
         let (canvas, window) = canvas(camera, box_m, look.size, below_px);
         let canvas = Canvas { is_plane: scenery.dimensions == 2 || is_plan, ..canvas };
-        let plan = is_plan.then(|| PlanFilm::new(frames, canvas, window, altitudes_m));
+        let plan = is_plan.then(|| PlanAnimation::new(frames, canvas, window, altitudes_m));
         let (width, height) = match look.size {
             AnimationSize::LongerSide(_) => {
-                let bottom_px = plan.as_ref().map_or(window.bottom(), PlanFilm::bottom_px);
+                let bottom_px = plan.as_ref().map_or(window.bottom(), PlanAnimation::bottom_px);
                 (window.width as u32, bottom_px as u32 + CAPTION_HEIGHT_PX)
             }
             AnimationSize::Exact([width, height]) => (width, height),

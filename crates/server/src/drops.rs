@@ -9,16 +9,21 @@ use axum::body::to_bytes;
 use axum::extract::{Request, State};
 use axum::response::{IntoResponse, Response};
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use tempfile::TempDir;
+use std::time::Duration;
+use tempfile::{NamedTempFile, TempDir};
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
+use tokio::time::timeout;
 
 /// Maximum size of one file, which is in memory until it is written.
 const MAX_FILE_BYTES: usize = 256 << 20;
 /// Maximum size of all copies of a server together.
 pub(crate) const MAX_DROPPED_BYTES: u64 = 2 << 30;
+/// Longest time for which a file has the turn while its bytes come: a page that is closed meanwhile sends no more.
+const MAX_ARRIVAL_TIME: Duration = Duration::from_secs(120);
 /// Maximum length of a path in parts: folders of sweeps have folders of runs.
 const MAX_PATH_PARTS: usize = 8;
 /// Maximum length of a part in bytes, that of file systems.
@@ -75,11 +80,15 @@ impl DropFolder {
         }
         let target = self.reserve(content.len() as u64, path)?.join(below);
         let folder = target.parent().unwrap_or(&target);
-        let written = fs::create_dir_all(folder).and_then(|()| fs::write(&target, content));
-        written.map(|()| target).map_err(|error| {
+        let replaced_bytes = fs::metadata(&target).map_or(0, |about| about.len());
+        if let Err(error) = write_whole(folder, &target, content) {
+            self.lock().bytes -= content.len() as u64;
             let cause = format!("cannot be kept: {error}");
-            Problem::new(path, cause, "make room on the disk, or start the studio with its folder")
-        })
+            let remedy = "make room on the disk, or start the studio with its folder";
+            return Err(Problem::new(path, cause, remedy));
+        }
+        self.lock().bytes -= replaced_bytes;
+        Ok(target)
     }
 
     /// Returns where a copy is that has the same path and content.
@@ -112,6 +121,15 @@ impl DropFolder {
     }
 }
 
+/// Writes a file under another name first: nobody reads a part of it.
+fn write_whole(folder: &Path, target: &Path, content: &[u8]) -> std::io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let mut file = NamedTempFile::new_in(folder)?;
+    file.write_all(content)?;
+    file.persist(target).map_err(|error| error.error)?;
+    Ok(())
+}
+
 /// Returns a path of plain names as one of this system; `None` if it has others.
 fn plain_path(text: &str) -> Option<PathBuf> {
     let is_plain = |part: &str| {
@@ -141,8 +159,12 @@ async fn store_body(state: &AppState, request: Request) -> Result<Response, Http
     let drops = state.deps.files.drops();
     // The semaphore is never closed.
     let _turn = drops.turn.acquire().await.map_err(|_| internal_error(&path))?;
-    let body = to_bytes(request.into_body(), MAX_FILE_BYTES).await.map_err(|_| {
-        let cause = format!("is cut off, or larger than {} MiB", MAX_FILE_BYTES >> 20);
+    let arrival = timeout(MAX_ARRIVAL_TIME, to_bytes(request.into_body(), MAX_FILE_BYTES)).await;
+    // Too late, cut off or too large: in each case its folder is the way.
+    let body = arrival.ok().and_then(Result::ok).ok_or_else(|| {
+        let seconds = MAX_ARRIVAL_TIME.as_secs();
+        let limit_mib = MAX_FILE_BYTES >> 20;
+        let cause = format!("is cut off, larger than {limit_mib} MiB, or takes over {seconds} s");
         let remedy = "start the studio with its folder instead: `sidestep studio FOLDER`";
         Problem::new(path.as_str(), cause, remedy)
     })?;
@@ -181,6 +203,17 @@ mod tests {
         }
         assert!(drops.store(&["a"; MAX_PATH_PARTS + 1].join("/"), b"x").is_err());
         assert_eq!(drops.used_bytes(), 0);
+    }
+
+    #[test]
+    fn a_copy_that_is_replaced_or_cannot_be_written_takes_no_room_any_more() {
+        let drops = DropFolder::default();
+        drops.store("a/x.toml", b"12345").expect("kept");
+        drops.store("a/x.toml", b"123").expect("kept");
+        assert_eq!(drops.used_bytes(), 3);
+        // There is a file where a folder would have to be.
+        assert!(drops.store("a/x.toml/y", b"12345678").is_err());
+        assert_eq!(drops.used_bytes(), 3);
     }
 
     #[test]

@@ -124,6 +124,7 @@ mod tests {
             names: vec![(ROBOT, 3, "Anna".into())],
             groups: Vec::new(),
             earth: Default::default(),
+            traffic: None,
         }
     }
 

@@ -11,6 +11,10 @@ use std::time::Duration;
 
 /// Maximum number of places kept of one run: 12 bytes each.
 const MAX_PLACES: usize = 1 << 20;
+/// Maximum number of samples kept of one run: also a run of few agents has a bound.
+const MAX_SAMPLES: usize = 1 << 14;
+/// Bytes that a sample takes beside its places: its entry, and its lists.
+const SAMPLE_BYTES: usize = 96;
 /// Maximum number of places in a reply, of all bodies together and of one: what the page keeps and draws.
 const MAX_REPLY_PLACES: usize = 240_000;
 const MAX_REPLY_PLACES_PER_BODY: usize = 600;
@@ -22,6 +26,8 @@ const MAX_COST_FRACTION: f64 = 0.05;
 pub(crate) struct TrailHistory {
     samples: BTreeMap<Cycle, Sample>,
     places: usize,
+    /// Number of agents in all lists of them; at most, since a list may have been replaced.
+    ids: usize,
     /// Cycles between two samples.
     spacing: Cycle,
     /// Computing time since the last sample, that of a cycle, and the time that a sample takes.
@@ -73,21 +79,31 @@ impl TrailHistory {
         let ids: Vec<BodyId> = agents.clone().map(|body| body.id()).collect();
         let places_m = agents.map(|body| body.pose.at_m.map(|meters| meters as f32)).collect();
         let last = self.samples.last_key_value().map(|(_, sample)| sample.agents.clone());
-        let agents = last.filter(|last| **last == *ids).unwrap_or_else(|| ids.into());
+        let agents = last.filter(|last| **last == *ids).unwrap_or_else(|| {
+            self.ids += ids.len();
+            ids.into()
+        });
         let sample = Sample { agents, places_m };
         self.places += sample.places_m.len();
         if let Some(before) = self.samples.insert(frame.cycle, sample) {
             self.places -= before.places_m.len();
         }
-        while self.places > MAX_PLACES && self.samples.len() > 2 {
+        while (self.places > MAX_PLACES || self.samples.len() > MAX_SAMPLES)
+            && self.samples.len() > 2
+        {
             self.drop_every_second();
         }
     }
 
-    /// Returns the bytes of the places that are kept, and their bound.
+    /// Returns the bytes of all that is kept, and their bound: at worst each sample has a list of agents of its own.
     pub(crate) fn bytes(&self) -> StoreBytes {
-        let bytes_of = |places: usize| (places * size_of::<[f32; 3]>()) as u64;
-        StoreBytes { used: bytes_of(self.places), max: bytes_of(MAX_PLACES) }
+        let bytes_of = |places: usize, ids: usize, samples: usize| {
+            let of_places = places * size_of::<[f32; 3]>();
+            let of_ids = ids * size_of::<BodyId>();
+            (of_places + of_ids + samples * SAMPLE_BYTES) as u64
+        };
+        let used = bytes_of(self.places, self.ids, self.samples.len());
+        StoreBytes { used, max: bytes_of(MAX_PLACES, MAX_PLACES, MAX_SAMPLES) }
     }
 
     fn drop_every_second(&mut self) {
@@ -97,39 +113,65 @@ impl TrailHistory {
             !is_odd
         });
         self.places = self.samples.values().map(|sample| sample.places_m.len()).sum();
+        self.ids = self.count_ids();
         self.spacing = 2 * self.spacing.max(1);
+    }
+
+    /// Returns the number of agents in all lists; one that successive samples share counts once.
+    fn count_ids(&self) -> usize {
+        let mut last: Option<&Arc<[BodyId]>> = None;
+        let mut ids = 0;
+        for sample in self.samples.values() {
+            if last.is_none_or(|last| !Arc::ptr_eq(last, &sample.agents)) {
+                ids += sample.agents.len();
+            }
+            last = Some(&sample.agents);
+        }
+        ids
     }
 
     /// Returns the trails of some bodies up to a cycle, or of all agents: the last part of each, as long as a reply may be.
     /// A body that was gone for a while has the part since it came back.
     pub(crate) fn trails_reply(&self, until: Cycle, bodies: &[protocol::BodyId]) -> ReplyBody {
-        let mut trails: BTreeMap<BodyId, Vec<(Cycle, [f32; 3])>> = BTreeMap::new();
+        let mut trails: BTreeMap<BodyId, TrailEnd> = BTreeMap::new();
         let mut places = 0;
-        let mut present: Option<&Sample> = None;
-        for (&cycle, sample) in self.samples.range(..=until).rev() {
-            let is_first = present.is_none();
+        for (index, (&cycle, sample)) in self.samples.range(..=until).rev().enumerate() {
+            let before = places;
             for (agent, at_m) in sample.agents.iter().zip(&sample.places_m) {
-                let own = trails.get_mut(agent);
-                let Some(points) = own else {
-                    // Agents that are not there at the end have no trail.
-                    if is_first && is_wanted(agent, bodies) {
-                        trails.insert(*agent, vec![(cycle, *at_m)]);
-                        places += 1;
-                    }
-                    continue;
-                };
-                if points.len() < MAX_REPLY_PLACES_PER_BODY {
-                    points.push((cycle, *at_m));
+                // Agents that are not there at the end have no trail.
+                if index == 0 && is_wanted(agent, bodies) {
+                    trails.insert(*agent, TrailEnd::default());
+                }
+                let Some(trail) = trails.get_mut(agent) else { continue };
+                if trail.push(index, (cycle, *at_m)) {
                     places += 1;
                 }
             }
-            present = Some(sample);
-            if places >= MAX_REPLY_PLACES {
+            // A trail that was not extended has its beginning.
+            if places >= MAX_REPLY_PLACES || places == before {
                 break;
             }
         }
-        let trails = trails.into_iter().map(|(agent, points)| body_trail(&agent, &points));
+        let trails = trails.into_iter().map(|(agent, trail)| body_trail(&agent, &trail.points));
         ReplyBody::Trails { trails: trails.collect() }
+    }
+}
+
+/// The last part of a trail, from its end on.
+#[derive(Debug, Default)]
+struct TrailEnd {
+    points: Vec<(Cycle, [f32; 3])>,
+}
+
+impl TrailEnd {
+    /// Adds the place of a body in a sample, counted from the end; returns false if it was not in the one after it, or
+    /// there are as many places as a reply may have.
+    fn push(&mut self, sample: usize, place: (Cycle, [f32; 3])) -> bool {
+        let goes_on = self.points.len() == sample && sample < MAX_REPLY_PLACES_PER_BODY;
+        if goes_on {
+            self.points.push(place);
+        }
+        goes_on
     }
 }
 
@@ -193,6 +235,30 @@ mod tests {
         let one = [airplane(1)];
         assert_eq!(trails(&history, 9, &one), [(1, vec![3.0, 4.0, 5.0])]);
         assert!(trails(&history, 1, &one).is_empty(), "it is not there yet");
+    }
+
+    #[test]
+    fn a_body_that_was_gone_for_a_while_has_the_part_since_it_came_back() {
+        let mut history = TrailHistory::default();
+        for cycle in 0..9 {
+            let numbers: &[u32] = if (3..5).contains(&cycle) { &[0] } else { &[0, 1] };
+            history.push(&frame(cycle, numbers), MS);
+        }
+        assert_eq!(trails(&history, 8, &[airplane(1)]), [(1, vec![5.0, 6.0, 7.0, 8.0])]);
+        assert_eq!(trails(&history, 2, &[airplane(1)]), [(1, vec![0.0, 1.0, 2.0])]);
+    }
+
+    #[test]
+    fn memory_of_a_long_run_with_one_agent_or_none_is_bounded() {
+        for numbers in [&[0][..], &[]] {
+            let mut history = TrailHistory::default();
+            for cycle in 0..3 * MAX_SAMPLES as Cycle {
+                history.push(&frame(cycle, numbers), Duration::ZERO);
+                assert!(history.samples.len() <= MAX_SAMPLES);
+            }
+            let StoreBytes { used, max } = history.bytes();
+            assert!(used > (MAX_SAMPLES * SAMPLE_BYTES / 2) as u64 && used <= max, "{used} {max}");
+        }
     }
 
     #[test]

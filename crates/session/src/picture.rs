@@ -37,7 +37,7 @@ impl PictureLook {
     /// # Errors
     /// When there is such an agent or view.
     pub(crate) fn check(&self, scenery: &Scenery, frame: &Frame) -> Result<(), InputError> {
-        AgentNumber::check_all(&self.agents, &frame.bodies)?;
+        AgentNumber::check_all(&self.agents, scenery, &frame.bodies)?;
         let is_from_above = matches!(self.view, PictureView::Usual | PictureView::Top);
         if scenery.dimensions == 2 && !is_from_above {
             let cause = "everything in this run lies in a plane, which is seen from above";

@@ -338,11 +338,16 @@ fn page_request<'a>(args: &'a ExportArgs, beside: Option<&'a RecordedRun>) -> Pa
 
 /// Refuses options that have no effect on the chosen format.
 fn check_options(args: &ExportArgs) -> Result<(), InputError> {
-    let format = args.to;
     if args.runs.is_some() {
         let remedy = "leave it out, or give the folder of a sweep";
         return Err(InputError::new("--runs", "means nothing for a single run", remedy));
     }
+    check_format_options(args)
+}
+
+/// Refuses options that have no effect on the chosen format, of a run or of the runs of a sweep.
+fn check_format_options(args: &ExportArgs) -> Result<(), InputError> {
+    let format = args.to;
     let is_seen = format.is_picture() || format.is_animation();
     let is_page = format == ExportFormat::Page;
     let given = [

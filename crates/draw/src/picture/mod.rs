@@ -35,7 +35,7 @@ pub use map_legend::describe;
 pub use trails::{TrailChoice, bodies_with_trails};
 pub use view::PictureView;
 
-pub(crate) use plan::{PlanFilm, film_altitudes_m};
+pub(crate) use plan::{PlanAnimation, animation_altitudes_m};
 
 pub(crate) use extent::{animation_bounds, check_content, projected_bounds};
 pub(crate) use surroundings::best_camera;

@@ -13,6 +13,8 @@ pub const OUTLIER_RULE: &str = "A run is an outlier in a metric if its value lie
 const MIN_RUNS: usize = 5;
 /// Distance from the quartiles in interquartile ranges beyond which a value is an outlier.
 const FENCE_RANGES: f64 = 1.5;
+/// Relative difference of two values that may come from rounding alone.
+const MAX_ROUNDING: f64 = 1e-9;
 
 /// A value of a run that is far from those of the other runs of its variant.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,7 +75,9 @@ fn outliers_of_variant(column: &RunColumn, rows: &[usize]) -> Vec<Outlier> {
     let range = third - first;
     let outlier = |(row, value): (usize, f64)| {
         let beyond = (value - third).max(first - value);
-        if beyond <= FENCE_RANGES * range || beyond <= 0.0 {
+        // Where most runs agree, another one is not special by its rounding alone.
+        let rounding = MAX_ROUNDING * first.abs().max(third.abs()).max(value.abs());
+        if beyond <= FENCE_RANGES * range || beyond <= rounding {
             return None;
         }
         Some(Outlier {
@@ -133,6 +137,7 @@ mod tests {
         assert_eq!(rows(&[1.0, 1.0, 1.0, 90.0]), []);
         let third = 1.0 / 3.0;
         assert_eq!(rows(&[third, third, third, third, third, third + 1e-16]), []);
+        assert_eq!(rows(&[third, third, third, third, third + 1e-16, 5.0]), [(5, true)]);
         assert_eq!(rows(&[1.0, 1.0, 1.0, 1.0, f64::NAN, 9.0]), [(5, true)]);
     }
 }

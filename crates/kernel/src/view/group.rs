@@ -1,7 +1,8 @@
 //! Agents that a scenario describes together, and agents by their numbers.
 
+use super::Scenery;
 use super::body::{Body, BodyId};
-use super::kind::BodyKind;
+use super::kind::{BodyKind, BodyRole};
 use crate::InputError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -44,15 +45,23 @@ impl AgentNumber {
     /// Refuses numbers that are certainly those of no agent.
     ///
     /// # Errors
-    /// When a number is beyond all of `bodies`, or an agent there has no such part. Others may come later, as airplanes
-    /// do.
-    pub fn check_all(agents: &[Self], bodies: &[Body]) -> Result<(), InputError> {
+    /// When a number is beyond all of `bodies` and all that have a start in the scenery, or an agent there has no such
+    /// part. Others may come later, or be gone, as airplanes are.
+    pub fn check_all(
+        agents: &[Self],
+        scenery: &Scenery,
+        bodies: &[Body],
+    ) -> Result<(), InputError> {
         let here: Vec<&Body> = bodies.iter().filter(|body| body.kind.is_agent()).collect();
+        let starts = scenery.bodies.iter();
+        let starts = starts.filter(|body| matches!(body.kind.role(), BodyRole::StartOf(_)));
+        let starts: Vec<u32> = starts.map(|body| body.number).collect();
+        let numbers = here.iter().map(|body| body.number).chain(starts.iter().copied());
+        let highest = numbers.max().unwrap_or(0);
         for agent in agents {
             if here.iter().any(|body| agent.matches(body.id())) {
                 continue;
             }
-            let highest = here.iter().map(|body| body.number).max().unwrap_or(0);
             let cause = if agent.number > highest {
                 format!("there is no such agent: their numbers are 0 to {highest}")
             } else if here.iter().any(|body| body.number == agent.number) {
@@ -93,7 +102,7 @@ impl fmt::Display for AgentNumber {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kind::samples::{AIRPLANE, ROBOT};
+    use super::super::kind::samples::{AIRPLANE, AIRPLANE_START, ROBOT};
     use super::super::{Pose, Shape};
     use super::*;
 
@@ -105,6 +114,35 @@ mod tests {
         assert!(!has(ROBOT, 4) && !has(AIRPLANE, 2));
     }
 
+    fn scenery_with(bodies: Vec<Body>) -> Scenery {
+        Scenery {
+            name: String::new(),
+            dimensions: 2,
+            cycle_s: 1.0,
+            floor: None,
+            bodies,
+            names: Vec::new(),
+            groups: Vec::new(),
+            earth: Default::default(),
+            traffic: None,
+        }
+    }
+
+    #[test]
+    fn agents_that_come_later_or_are_gone_have_the_numbers_of_their_starts() {
+        let start = |number| {
+            let shape = Shape::Sphere { radius_m: 0.1 };
+            Body::new(AIRPLANE_START, number, Pose::from_position([0.0; 3]), shape)
+        };
+        let scenery = scenery_with((0..3).map(start).collect());
+        let check = |number| {
+            let agent = AgentNumber { number, part: None };
+            AgentNumber::check_all(&[agent], &scenery, &[]).map_err(|error| error.to_string())
+        };
+        assert_eq!((check(0), check(2)), (Ok(()), Ok(())));
+        assert!(check(3).expect_err("refused").contains("their numbers are 0 to 2"));
+    }
+
     #[test]
     fn numbers_that_no_agent_has_are_refused_in_words() {
         let robot = |number| {
@@ -112,9 +150,10 @@ mod tests {
             Body::new(ROBOT, number, Pose::from_position([0.0; 3]), shape)
         };
         let bodies: Vec<Body> = [0, 1, 3].map(robot).to_vec();
+        let scenery = scenery_with(Vec::new());
         let check = |text: &str| {
             let agent: AgentNumber = text.parse().expect("a number");
-            AgentNumber::check_all(&[agent], &bodies).map_err(|error| error.to_string())
+            AgentNumber::check_all(&[agent], &scenery, &bodies).map_err(|error| error.to_string())
         };
         assert!(check("4").expect_err("refused").contains("their numbers are 0 to 3"));
         assert!(check("3/5").expect_err("refused").contains("has no such part"));

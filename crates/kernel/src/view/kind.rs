@@ -341,6 +341,19 @@ pub(super) mod samples {
         shows_heading: false,
     });
 
+    /// The start of an airplane.
+    pub(crate) const AIRPLANE_START: BodyKind = BodyKind::new(&KindSpec {
+        name: "airplane-start",
+        noun: "start",
+        rank: 1,
+        role: BodyRole::StartOf(AIRPLANE),
+        layer: 1,
+        paint: Paint::ByNumber { opacity: 1.0 },
+        outline: Outline::White,
+        legend: LegendTexts::AGENT,
+        shows_heading: false,
+    });
+
     /// An airplane.
     pub(crate) const AIRPLANE: BodyKind = BodyKind::new(&KindSpec {
         name: "airplane",

@@ -121,6 +121,8 @@ fn row(gallery: &Gallery, run: &GalleryRun, is_number: &[bool]) -> Markup {
                 }
             }
             td { @if outliers > 0 { (outliers) } }
+            // A run that failed has no values, and a cell of each column nevertheless: columns are found by their place.
+            @for _ in run.values.len()..is_number.len() { td {} }
             @for (k, value) in run.values.iter().enumerate() {
                 td .words[!is_number[k]] title=[value.mark.as_ref().map(|mark| &mark.words)] {
                     (value.text) @if let Some(mark) = &value.mark { " " (badge(mark)) }

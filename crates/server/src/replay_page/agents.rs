@@ -1,6 +1,6 @@
 //! Which agents are inspected for a replay, and in which cycles.
 
-use sidestep_kernel::view::{AgentNumber, Body, Frame};
+use sidestep_kernel::view::{AgentNumber, Body, Frame, Scenery};
 use sidestep_kernel::{Cycle, InputError};
 use sidestep_session::export::CycleWindow;
 
@@ -35,6 +35,7 @@ impl InspectionRequest {
     /// When an agent is not there, or the window has none of the cycles.
     pub(super) fn check(
         &self,
+        scenery: &Scenery,
         first: &Frame,
         (from, until): (Cycle, Cycle),
     ) -> Result<(), InputError> {
@@ -45,7 +46,7 @@ impl InspectionRequest {
             let cause = format!("the file has cycles {from} to {until}");
             return Err(InputError::new(place, cause, format!("give {from}:{until} or less")));
         }
-        AgentNumber::check_all(&self.agents, &first.bodies)
+        AgentNumber::check_all(&self.agents, scenery, &first.bodies)
     }
 
     /// Refuses a request of which no run of a sweep has anything.
@@ -93,6 +94,21 @@ mod tests {
         Frame { cycle, bodies: (0..4).map(robot).collect(), ..Frame::default() }
     }
 
+    fn scenery() -> Scenery {
+        let bodies = Vec::new();
+        Scenery {
+            name: String::new(),
+            dimensions: 2,
+            cycle_s: 1.0,
+            floor: None,
+            bodies,
+            names: Vec::new(),
+            groups: Vec::new(),
+            earth: Default::default(),
+            traffic: None,
+        }
+    }
+
     fn request(agents: &[&str], cycles: Option<&str>) -> InspectionRequest {
         InspectionRequest {
             agents: agents.iter().map(|text| text.parse().expect("a number")).collect(),
@@ -119,7 +135,7 @@ mod tests {
 
     #[test]
     fn what_is_not_there_is_refused_in_words() {
-        let check = |request: InspectionRequest| request.check(&frame(0), (0, 100));
+        let check = |request: InspectionRequest| request.check(&scenery(), &frame(0), (0, 100));
         let told = |request| check(request).expect_err("refused").to_string();
         assert!(told(request(&["4"], None)).contains("their numbers are 0 to 3"));
         assert!(told(request(&["3/5"], None)).contains("has no such part"));

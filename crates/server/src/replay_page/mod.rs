@@ -230,7 +230,7 @@ fn collect_run(
     // Runs of a sweep may have fewer agents and cycles than others of it; the sweep is refused where none has them.
     if options.trial.is_none() {
         let first = run.frame(FrameOptions::WITHOUT_SCANS);
-        options.inspections.check(&first, (from, until))?;
+        options.inspections.check(&run.scenery(), &first, (from, until))?;
     }
     let world_type = worlds.find(run.world_name());
     let words = world_type.map(MetricWords::from_world).unwrap_or_default();

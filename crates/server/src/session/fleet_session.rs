@@ -125,7 +125,9 @@ impl FleetSession {
         self.frame.log.retain(|entry| entry.cycle >= self.known_until);
         self.known_until = self.frame.cycle;
         self.log.record(&mut self.frame);
-        self.trails.push(&self.frame, Duration::ZERO);
+        if self.trails.is_due(self.frame.cycle) {
+            self.trails.push(&self.frame, Duration::ZERO);
+        }
         self.usage.set(SessionBytes { events: self.log.bytes(), ..SessionBytes::default() });
         snapshot
     }

@@ -63,6 +63,12 @@ fn gallery_run(
     columns: &[MetricColumn<'_>],
 ) -> GalleryRun {
     let failure = sweep.table.column("failure");
+    let failure = failure.map_or_else(String::new, |column| column.values.text(run.row));
+    // Without an end it has failed, whatever the table says.
+    let failure = match (run.end.is_some(), failure.is_empty()) {
+        (false, true) => "it did not come to its end".to_string(),
+        _ => failure,
+    };
     let values = columns.iter().map(|column| {
         let mut of_run = sweep.outliers.get(&run.row).into_iter().flatten();
         let outlier = of_run.find(|outlier| outlier.metric == column.values.name);
@@ -78,7 +84,7 @@ fn gallery_run(
         values: if run.end.is_some() { values.collect() } else { Vec::new() },
         page: None,
         picture: None,
-        failure: failure.map_or_else(String::new, |column| column.values.text(run.row)),
+        failure,
     }
 }
 
@@ -198,7 +204,9 @@ fn hint(sweep: &FinishedSweep, folder: &Folder, replays: usize) -> Text {
         return Text::from("Every run has a replay.");
     }
     let command = sidestep_command("export --to page --runs all --replace", name);
-    Text::from("All runs get a replay by ").append(Text::code(command)).append(".")
+    // The page may be anywhere, and tells no place of this machine.
+    let words = ", with --out and all other options as they were.";
+    Text::from("All runs get a replay by ").append(Text::code(command)).append(words)
 }
 
 #[cfg(test)]

@@ -177,11 +177,11 @@ fn first_rows(recorded: &Recorded, cycles: &[u64], agents: Option<&RecordedPosit
     let shown = recorded.rows().min(MAX_ROWS);
     let mut table =
         Table::new("Events one by one", omitted_rows_note(recorded.rows(), shown), &names).folded();
-    for row in 0..shown {
+    for (row, &cycle) in cycles.iter().enumerate().take(shown) {
         let cells = columns.iter().zip(&recorded.columns);
         table.push_row(cells.map(|(column, values)| format_cell(column, values, row)));
         let agent = agents.and_then(|agents| agent_name(recorded, agents, row));
-        table.moments.push(RunMoment { cycle: cycles[row], agent });
+        table.moments.push(RunMoment { cycle, agent });
     }
     table
 }

@@ -1,6 +1,6 @@
 //! The runs of a sweep as a folder of pages.
 
-use super::{ExportArgs, ExportFormat, export_scope};
+use super::{ExportArgs, ExportFormat, check_format_options, export_scope};
 use crate::console::{Console, group_thousands};
 use crate::console_watcher::ConsoleWatcher;
 use crate::exit::{ExitCode, Failure};
@@ -61,7 +61,7 @@ fn check_options(args: &ExportArgs, folder: &Folder) -> Result<(), InputError> {
             return Err(InputError::new(option, cause, "leave it out"));
         }
     }
-    Ok(())
+    check_format_options(args)
 }
 
 fn print_result(result: &GalleryResult, console: Console) -> Result<(), Failure> {

@@ -66,8 +66,10 @@ fn rings_on_one_level<'a>(lines: &[&'a Body]) -> Vec<&'a [Vec3]> {
     let mut rings: Vec<&[Vec3]> = Vec::new();
     for body in lines {
         let Shape::Line { points_m, .. } = &body.shape else { continue };
-        let is_on_level = rings.first().is_none_or(|first| first[0][2] == points_m[0][2]);
-        if points_m.len() > 2 && is_on_level {
+        if points_m.len() < 3 {
+            continue;
+        }
+        if rings.first().is_none_or(|first| first[0][2] == points_m[0][2]) {
             rings.push(points_m);
         }
     }
@@ -118,8 +120,8 @@ pub(super) fn draw_labels(svg: &mut Svg, plan: &Plan<'_>, areas: &[DrawnArea<'_>
         let height = 2.5 * size_px;
         // Inside of what is shown, though the middle of a large area may be outside.
         let map = plan.window.map;
-        let x = middle.0.clamp(map.x + 0.5 * width, (map.right() - 0.5 * width).max(map.x));
-        let y = middle.1.clamp(map.y + 0.5 * height, (map.bottom() - 0.5 * height).max(map.y));
+        let x = clamp_inside(middle.0, map.x + 0.5 * width, map.right() - 0.5 * width);
+        let y = clamp_inside(middle.1, map.y + 0.5 * height, map.bottom() - 0.5 * height);
         let rect = Rect { x: x - 0.5 * width, y: y - 0.5 * height, width, height };
         for (row, line) in lines.into_iter().enumerate() {
             let weight = if row == 0 { Weight::Bold } else { Weight::Regular };
@@ -135,6 +137,11 @@ pub(super) fn draw_labels(svg: &mut Svg, plan: &Plan<'_>, areas: &[DrawnArea<'_>
         taken.push(rect);
     }
     taken
+}
+
+/// Returns the nearest place between two; the low one if words are larger than the map, and the two change places.
+fn clamp_inside(place: f64, low: f64, high: f64) -> f64 {
+    place.clamp(low, high.max(low))
 }
 
 fn bounds_px(plan: &Plan<'_>, area: &DrawnArea<'_>) -> [Px; 2] {

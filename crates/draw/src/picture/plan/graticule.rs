@@ -15,7 +15,7 @@ const STEPS_ARC_S: [f64; 22] = [
 /// Points of a line, which is straight on few charts.
 const POINTS: u32 = 17;
 /// Halvings of an interval in which a line crosses a column or row: they find it to a millionth of the plan.
-const HALVINGS: u32 = 20;
+const BISECTIONS: u32 = 20;
 /// Least distance of two lines on the picture, in sizes of letters.
 const MIN_SPACING_LETTERS: f64 = 8.0;
 
@@ -203,7 +203,7 @@ impl EarthCoordinate<'_> {
         if !is_inside {
             return None;
         }
-        for _ in 0..HALVINGS {
+        for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
             if self.in_row_deg(middle, beside) < value_deg {
                 low = middle;

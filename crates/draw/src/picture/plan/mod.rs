@@ -5,13 +5,13 @@
 //! graticule.rs  latitudes and longitudes, or distances        aircraft.rs     symbols, velocity vectors, zones
 //! areas.rs      areas with their limits                       data_blocks.rs  call sign, level, speed
 //! routes.rs     routes, and the ends of trails                profile.rs      altitudes over distances east
-//! film.rs       the same without axes, for animations
+//! animation.rs  the same without axes, for animations
 //! ```
 
 mod aircraft;
+mod animation;
 mod areas;
 mod data_blocks;
-mod film;
 mod graticule;
 mod profile;
 mod routes;
@@ -20,7 +20,7 @@ mod sheet;
 mod tests;
 mod units;
 
-pub(crate) use film::{PlanFilm, film_altitudes_m};
+pub(crate) use animation::{PlanAnimation, animation_altitudes_m};
 pub(super) use sheet::draw;
 
 use super::{Scene, trail_lines};

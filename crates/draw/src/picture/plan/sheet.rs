@@ -304,12 +304,23 @@ impl PlanSheet<'_> {
         let plan = self.plan;
         let top = self.top + 12.0;
         let bar_px = draw_scale_bar(&mut self.svg, plan, (plan.window.map.x, top), width_px);
-        let left = plan.window.map.x + bar_px + 2.0 * plan.style.font_px;
         let entries = plan.legend_entries(self.areas);
         let size_px = plan.style.small_px();
+        let beside = plan.window.map.x + bar_px + 2.0 * plan.style.font_px;
+        let widths =
+            entries.iter().map(|entry| text::width(&entry.label, size_px, Weight::Regular));
+        // With its symbol.
+        let longest_px = widths.fold(0.0, f64::max) + 4.0 * size_px;
+        // In a narrow picture the words go below the bar, or they would be cut.
+        let (left, legend_top) = if beside + longest_px <= width_px - EDGE_PX {
+            (beside, top - 4.0)
+        } else {
+            (EDGE_PX, top + 2.6 * size_px)
+        };
         let legend = Legend::new(entries, size_px, width_px - left - EDGE_PX);
-        legend.draw(&mut self.svg, left, top - 4.0);
-        self.top = top + legend.height_px().max(2.4 * size_px) + 6.0;
+        legend.draw(&mut self.svg, left, legend_top);
+        let bottom = (legend_top + 4.0 + legend.height_px()).max(top + 2.4 * size_px);
+        self.top = bottom + 6.0;
     }
 
     fn finish(mut self, words: &str, title: &str, width_px: f64) -> String {

@@ -193,7 +193,7 @@ fn a_profile_is_aligned_with_the_plan_and_higher_traffic_is_higher() {
         assert!((number(dot, "cx") - number(vector, "x1")).abs() < 0.05, "{dot} {vector}");
     }
     assert!(number(dots[1], "cy") < number(dots[0], "cy") - 5.0, "2000 feet higher");
-    assert!(texts(&svg).iter().any(|word| *word == "FL240"), "{svg}");
+    assert!(texts(&svg).contains(&"FL240"), "{svg}");
 }
 
 #[test]

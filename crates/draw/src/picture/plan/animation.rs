@@ -22,14 +22,14 @@ const LETTER_FRACTION: f64 = 0.017;
 const LETTER_PX: [f64; 2] = [9.0, 15.0];
 
 /// The places of plan and profile in all pictures of an animation.
-pub(crate) struct PlanFilm {
+pub(crate) struct PlanAnimation {
     window: PlanWindow,
     profile: Option<ProfileWindow>,
     style: Style,
     lookahead_s: Option<f64>,
 }
 
-impl PlanFilm {
+impl PlanAnimation {
     /// Returns the view for a canvas that shows all that the frames have in `map`, and for their altitudes.
     pub(crate) fn new(frames: &[Frame], canvas: Canvas, map: Rect, altitudes_m: [f64; 2]) -> Self {
         let window = PlanWindow { canvas, map };
@@ -38,7 +38,7 @@ impl PlanFilm {
         let style = Style { width_px: map.width, height_px: map.height, font_px };
         let times = frames.iter().filter_map(|frame| lookahead_s(frame, Plan::extent_m(&window)));
         let shortest_s = times.fold(f64::INFINITY, f64::min);
-        let mut film = Self {
+        let mut animation = Self {
             window,
             profile: None,
             style,
@@ -46,9 +46,9 @@ impl PlanFilm {
             lookahead_s: shortest_s.is_finite().then_some(shortest_s),
         };
         if altitudes_m[0] < altitudes_m[1] {
-            film.add_profile(altitudes_m);
+            animation.add_profile(altitudes_m);
         }
-        film
+        animation
     }
 
     /// Returns the room below the plan that a profile takes at most in a picture of an exact size; elsewhere the picture
@@ -114,6 +114,6 @@ impl PlanFilm {
 }
 
 /// Returns the altitudes of an animation's profile from its extent; the same number twice where all is on one level.
-pub(crate) fn film_altitudes_m(scenery: &Scenery, [low_m, high_m]: [Vec3; 2]) -> [f64; 2] {
+pub(crate) fn animation_altitudes_m(scenery: &Scenery, [low_m, high_m]: [Vec3; 2]) -> [f64; 2] {
     if scenery.dimensions == 2 { [0.0; 2] } else { [low_m[2], high_m[2]] }
 }
