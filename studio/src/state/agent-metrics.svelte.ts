@@ -2,9 +2,7 @@
 
 import type { MetricName, ReplyBody } from "../protocol";
 import type { AgentValues } from "./color-mode";
-
-/** The server computes the metrics of all agents for a request: it spends no more than a tenth of the time on it. */
-const MIN_PAUSE_PER_REPLY = 10;
+import { Pace } from "./pace";
 
 /** Asks for the names of metrics, or for the values of one. */
 type FetchMetrics = (metric: string | null) => Promise<ReplyBody>;
@@ -14,7 +12,7 @@ export class AgentMetrics {
   names = $state.raw<MetricName[] | null>(null);
   values = $state.raw<AgentValues | null>(null);
   #isFetching = false;
-  #dueAt_ms = 0;
+  readonly #pace = new Pace();
   #age = 0;
 
   clear(): void {
@@ -22,7 +20,7 @@ export class AgentMetrics {
     this.values = null;
     this.#age++;
     this.#isFetching = false;
-    this.#dueAt_ms = 0;
+    this.#pace.reset();
   }
 
   /** Fetches the names, if they are not known. */
@@ -35,7 +33,7 @@ export class AgentMetrics {
   async fetchValues(metric: string, cycle: number, ask: FetchMetrics): Promise<void> {
     const { values } = this;
     if (values?.key === metric && values.cycle === cycle) return;
-    if (values?.key === metric && performance.now() < this.#dueAt_ms) return;
+    if (values?.key === metric && !this.#pace.isDue) return;
     await this.#fetch(metric, ask);
   }
 
@@ -43,12 +41,11 @@ export class AgentMetrics {
     if (this.#isFetching) return;
     const age = this.#age;
     this.#isFetching = true;
-    const began_ms = performance.now();
+    const sentAt_ms = performance.now();
     try {
       const answer = await ask(metric);
       if (age !== this.#age || answer.is !== "agent-metrics") return;
-      const now_ms = performance.now();
-      this.#dueAt_ms = now_ms + MIN_PAUSE_PER_REPLY * (now_ms - began_ms);
+      this.#pace.onReply(sentAt_ms);
       if (metric === null) this.names = answer.names;
       else this.values = this.#valuesOf(metric, answer.cycle, answer.values);
     } finally {

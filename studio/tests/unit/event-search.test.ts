@@ -2,6 +2,7 @@
 
 import { expect, test, vi } from "vitest";
 import type { ReplyBody, RunEvent } from "../../src/protocol";
+import { RequestError, makeProblem } from "../../src/connection";
 import { EventSearch, EVENTS_PER_PAGE } from "../../src/state/event-search.svelte";
 import { Events } from "../../src/state/events.svelte";
 
@@ -50,6 +51,57 @@ test("what has happened since is found too, without losing the pages that are sh
   expect(asked.length).toBe(3);
   search.type("", null, serverOf(950, asked));
   expect([search.isActive, search.entries.length]).toEqual([false, 0]);
+  vi.useRealTimers();
+});
+
+test("a search is asked again after a restart, and after a request that failed, whose problem is told", async () => {
+  vi.useFakeTimers();
+  const asked: unknown[] = [];
+  const search = new EventSearch();
+  search.type("wall", null, serverOf(3, asked));
+  await search.refresh(3, serverOf(3, asked));
+  expect(asked, "typing may go on").toEqual([]);
+  await vi.runAllTimersAsync();
+  await search.refresh(3, serverOf(3, asked));
+  expect(asked.length, "the first reply had all events").toBe(1);
+  search.clear();
+  expect([search.isActive, search.found]).toEqual([true, null]);
+  const problem = makeProblem("events", "the connection was lost", "wait");
+  await search.refresh(0, () => Promise.reject(new RequestError(problem)));
+  expect([search.found, search.problem]).toEqual([null, problem]);
+  await search.refresh(0, serverOf(0, asked));
+  expect([search.found?.found, search.problem]).toEqual([0, null]);
+  vi.useRealTimers();
+});
+
+test("a page that cannot be added leaves those that are shown, with the problem", async () => {
+  vi.useFakeTimers();
+  const search = new EventSearch();
+  search.type("wall", null, serverOf(900, []));
+  await vi.runAllTimersAsync();
+  const problem = makeProblem("events", "the connection was lost", "wait");
+  await search.more(() => Promise.reject(new RequestError(problem)));
+  expect([search.entries.length, search.problem]).toEqual([500, problem]);
+  vi.useRealTimers();
+});
+
+test("a run that goes on is searched one request at a time, for a tenth of the time", async () => {
+  vi.useFakeTimers();
+  const asked: unknown[] = [];
+  const search = new EventSearch();
+  const slow = async (...all: Parameters<ReturnType<typeof serverOf>>): Promise<ReplyBody> => {
+    await new Promise((then) => setTimeout(then, 500));
+    return serverOf(100 + asked.length, asked)(...all);
+  };
+  search.type("wall", null, slow);
+  for (let k = 0; k < 50; k++) {
+    void search.refresh(200 + k, slow);
+    await vi.advanceTimersByTimeAsync(400);
+  }
+  // 20 s hold a search of half a second each 5.5 s.
+  expect(asked.length).toBeGreaterThanOrEqual(3);
+  expect(asked.length).toBeLessThanOrEqual(5);
+  expect(search.found?.found).toBe(100 + asked.length - 1);
   vi.useRealTimers();
 });
 
