@@ -57,25 +57,46 @@ function namesOf({ kind, number, part }: BodyId): string[] {
   return [short, `${kind}/${short}`];
 }
 
+/**
+ * What an address asks for that is not done yet. Cycle and agent wait for something of their own: the cycle until all runs
+ * are open, the agent until its body is known.
+ */
+export class LinkRequest {
+  #link: Link;
+
+  constructor(link: Link) {
+    this.#link = link;
+  }
+
+  /** Takes the cycle to go to, once. */
+  takeCycle(): number | null {
+    const { cycle } = this.#link;
+    this.#link = { ...this.#link, cycle: null };
+    return cycle;
+  }
+
+  /** Takes the agent to select, once it is among the bodies. */
+  takeAgent(bodies: Bodies): BodyId | null {
+    const { agent } = this.#link;
+    const body = agent === null ? null : findAgent(bodies, agent);
+    if (body !== null) this.#link = { ...this.#link, agent: null };
+    return body;
+  }
+}
+
 /** Shows what the address says, also when it changes; and keeps it up to date while the replay rests. */
 export function followLink(studio: Studio): void {
-  let requested: Link | null = parseLink(location.hash);
+  let request = new LinkRequest(parseLink(location.hash));
   let timer: ReturnType<typeof setTimeout> | undefined;
 
-  /** Goes to the requested cycle; the agent is selected once its body is known. */
   function go(): void {
-    if (requested === null) return;
-    const { cycle } = requested;
-    requested = { ...requested, cycle: null };
+    const cycle = request.takeCycle();
     if (cycle !== null) studio.seek(cycle);
   }
 
   function selectAgent(session: Session, bodies: Bodies): void {
-    if (requested?.agent == null) return void (requested = null);
-    const body = findAgent(bodies, requested.agent);
-    if (body === null) return;
-    requested = null;
-    session.selection.select(body);
+    const body = request.takeAgent(bodies);
+    if (body !== null) session.selection.select(body);
   }
 
   function write(link: Link): void {
@@ -99,7 +120,7 @@ export function followLink(studio: Studio): void {
     });
   });
   addEventListener("hashchange", () => {
-    requested = parseLink(location.hash);
+    request = new LinkRequest(parseLink(location.hash));
     const session = studio.active;
     if (!session) return;
     go();

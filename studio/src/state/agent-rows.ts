@@ -2,8 +2,14 @@
 
 import type { Bodies } from "./bodies";
 
-export type AgentRow =
-  { kind: "group"; group: number; name: string; count: number; isFolded: boolean } | { kind: "agent"; index: number };
+/** The place of a row among those beside it, from 1 on, and their number: the page has only the rows that can be seen. */
+interface RowPlace {
+  place: number;
+  places: number;
+}
+
+export type AgentRow = RowPlace &
+  ({ kind: "group"; group: number; name: string; count: number; isClosed: boolean } | { kind: "agent"; index: number });
 
 /** Returns the agents that have all words of a filter in their names or in that of their group. */
 export function findAgents(bodies: Bodies, filter: string): number[] {
@@ -17,10 +23,11 @@ export function findAgents(bodies: Bodies, filter: string): number[] {
   });
 }
 
-/** Returns the rows for some agents; those of folded groups are left out. Agents without a group come last. */
-export function rowsOf(bodies: Bodies, agents: readonly number[], folded: ReadonlySet<number>): AgentRow[] {
-  const rowOf = (index: number): AgentRow => ({ kind: "agent", index });
-  if (bodies.groups.length < 2) return agents.map(rowOf);
+/** Returns the rows for some agents; those of closed groups are left out. Agents without a group come last. */
+export function rowsOf(bodies: Bodies, agents: readonly number[], closed: ReadonlySet<number>): AgentRow[] {
+  const rowsOfAgents = (indices: readonly number[]): AgentRow[] =>
+    indices.map((index, k) => ({ kind: "agent", index, place: k + 1, places: indices.length }));
+  if (bodies.groups.length < 2) return rowsOfAgents(agents);
   const members = new Map<number, number[]>();
   for (const index of agents) {
     const group = bodies.groupOf[index]!;
@@ -29,11 +36,12 @@ export function rowsOf(bodies: Bodies, agents: readonly number[], folded: Readon
     else members.set(group, [index]);
   }
   const order = [...members.keys()].sort((a, b) => (a < 0 ? Infinity : a) - (b < 0 ? Infinity : b));
-  return order.flatMap((group): AgentRow[] => {
+  return order.flatMap((group, k): AgentRow[] => {
     const own = members.get(group)!;
-    const isFolded = folded.has(group);
+    const isClosed = closed.has(group);
     const name = bodies.groups[group]?.name ?? "others";
-    const heading: AgentRow = { kind: "group", group, name, count: own.length, isFolded };
-    return [heading, ...(isFolded ? [] : own.map(rowOf))];
+    const rowPlace = { place: k + 1, places: order.length };
+    const heading: AgentRow = { kind: "group", group, name, count: own.length, isClosed, ...rowPlace };
+    return [heading, ...(isClosed ? [] : rowsOfAgents(own))];
   });
 }

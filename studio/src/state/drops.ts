@@ -8,15 +8,15 @@ import { parseFailure } from "./results";
 export const MAX_FILES = 5000;
 
 /** A dropped file and its path within the drop. */
-export interface DroppedFile {
+export interface DropFile {
   path: string;
   file: File;
 }
 
 /** A file or a folder at the top of a drop. */
-export interface DroppedItem {
+export interface DropItem {
   name: string;
-  files: DroppedFile[];
+  files: DropFile[];
 }
 
 /** The parts of `FileSystemEntry` that are used. */
@@ -40,23 +40,44 @@ const tooMany = (name: string): RequestError =>
     ),
   );
 
+const unreadable = (name: string): RequestError =>
+  new RequestError(
+    makeProblem(
+      name,
+      "could not be read",
+      "check that it still exists and that you may read it; or start the studio with its folder: `sidestep studio FOLDER`",
+    ),
+  );
+
+/** What a browser hands to callbacks; its error, which tells little, becomes one with the name of the file. */
+async function callbackOf<T>(
+  name: string,
+  start: (then: (value: T) => void, fail: (error: unknown) => void) => void,
+): Promise<T> {
+  try {
+    return await new Promise<T>(start);
+  } catch {
+    throw unreadable(name);
+  }
+}
+
 async function entriesOf(folder: FolderOfEntry): Promise<Entry[]> {
   const reader = folder.createReader();
   const all: Entry[] = [];
   while (true) {
     // A reader returns some at a time, and none at the end.
-    const some = await new Promise<Entry[]>((then, fail) => reader.readEntries(then, fail));
+    const some = await callbackOf<Entry[]>(folder.name, (then, fail) => reader.readEntries(then, fail));
     if (some.length === 0) return all;
     all.push(...some);
     if (all.length > MAX_FILES) throw tooMany(folder.name);
   }
 }
 
-async function collect(entry: Entry, above: string, files: DroppedFile[]): Promise<void> {
+async function collect(entry: Entry, above: string, files: DropFile[]): Promise<void> {
   const path = above + entry.name;
   if (files.length >= MAX_FILES) throw tooMany(path);
   if (!entry.isDirectory) {
-    const file = await new Promise<File>((then, fail) => (entry as FileOfEntry).file(then, fail));
+    const file = await callbackOf<File>(path, (then, fail) => (entry as FileOfEntry).file(then, fail));
     files.push({ path, file });
     return;
   }
@@ -67,13 +88,15 @@ async function collect(entry: Entry, above: string, files: DroppedFile[]): Promi
 }
 
 /** Reads what was dropped; the transfer itself is only valid during the event, its entries are longer. */
-export function itemsOf(transfer: DataTransfer): Promise<DroppedItem[]> {
-  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.() ?? null);
+export function itemsOf(transfer: DataTransfer): Promise<DropItem[]> {
+  // A transfer may hold texts too, which have no file.
+  const items = [...transfer.items].filter(({ kind }) => kind === "file");
+  const entries = items.map((item) => item.webkitGetAsEntry?.() ?? null);
   const plain = [...transfer.files];
   return Promise.all(
     plain.map(async (file, i) => {
       const entry = entries[i] as Entry | null | undefined;
-      const files: DroppedFile[] = [];
+      const files: DropFile[] = [];
       if (entry) await collect(entry, "", files);
       else files.push({ path: file.name, file });
       return { name: entry?.name ?? file.name, files };
@@ -82,7 +105,7 @@ export function itemsOf(transfer: DataTransfer): Promise<DroppedItem[]> {
 }
 
 /** Copies files to the server. Returns the server's path of the item. */
-export async function upload(item: DroppedItem, drop: string, onProgress: (done: number) => void): Promise<string> {
+export async function upload(item: DropItem, drop: string, onProgress: (done: number) => void): Promise<string> {
   let path = "";
   let done = 0;
   for (const { path: below, file } of item.files) {

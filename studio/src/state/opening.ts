@@ -2,7 +2,7 @@
 
 import { RequestError } from "../connection";
 import type { FileEntry } from "../protocol";
-import { actionOf, itemsOf, upload, type DroppedItem } from "./drops";
+import { actionOf, itemsOf, upload, type DropItem } from "./drops";
 import { page } from "./page.svelte";
 import type { Studio } from "./studio.svelte";
 
@@ -28,10 +28,10 @@ export async function openEntry(studio: Studio, entry: FileEntry, seed: number |
 type OnProgress = (words: string) => void;
 
 /** Opens what was dropped: each file or folder by itself, files beside them go with them. */
-export async function openDropped(studio: Studio, transfer: DataTransfer, onProgress: OnProgress): Promise<void> {
+export async function openDrop(studio: Studio, transfer: DataTransfer, onProgress: OnProgress): Promise<void> {
   try {
     const items = await itemsOf(transfer);
-    for (const item of grouped(items)) await openItem(studio, item, onProgress);
+    for (const item of groupItems(items)) await openItem(studio, item, onProgress);
   } catch (error) {
     if (!(error instanceof RequestError)) throw error;
     studio.onProblem(error.problem);
@@ -44,11 +44,11 @@ export async function openDropped(studio: Studio, transfer: DataTransfer, onProg
  * The items to open. Of files that are dropped together those that a scenario or a map may name are copied, and only the
  * others opened: a map of ROS comes with its image.
  */
-function grouped(items: DroppedItem[]): DroppedItem[] {
-  const hasEnding = (endings: RegExp) => (item: DroppedItem) => endings.test(item.name);
+function groupItems(items: DropItem[]): DropItem[] {
+  const hasEnding = (endings: RegExp) => (item: DropItem) => endings.test(item.name);
   const leaders = items.filter(hasEnding(/\.(toml|ya?ml|scn)$/i));
   if (leaders.length === 0 || leaders.length === items.length) return items;
-  const isFile = ({ files, name }: DroppedItem): boolean => files.length === 1 && files[0]!.path === name;
+  const isFile = ({ files, name }: DropItem): boolean => files.length === 1 && files[0]!.path === name;
   const followers = items.filter((item) => !leaders.includes(item) && isFile(item));
   const others = items.filter((item) => !leaders.includes(item) && !isFile(item));
   const led = leaders.map((leader) => ({
@@ -58,7 +58,7 @@ function grouped(items: DroppedItem[]): DroppedItem[] {
   return [...led, ...others];
 }
 
-async function openItem(studio: Studio, item: DroppedItem, onProgress: OnProgress): Promise<void> {
+async function openItem(studio: Studio, item: DropItem, onProgress: OnProgress): Promise<void> {
   onProgress(`Reading ${item.name}…`);
   const { length } = item.files;
   const drop = crypto.getRandomValues(new Uint32Array(2)).join("-");

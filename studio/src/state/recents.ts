@@ -65,11 +65,11 @@ export function placeOf(target: OpenTarget): string {
   return target.kind === "shipped" ? `shipped: ${target.name}` : target.path;
 }
 
-const TIME: Intl.DateTimeFormatOptions = { hour: "2-digit", minute: "2-digit", hour12: false };
+const TIME: Intl.DateTimeFormatOptions = { hour: "2-digit", minute: "2-digit", hourCycle: "h23" };
 
 /** When a target was opened, as briefly as can be understood: today the time, else the day. */
-export function openedText(opened: string | undefined, now = new Date()): string {
-  const then = new Date(opened ?? "");
+export function lastUseText(lastUse: string | undefined, now = new Date()): string {
+  const then = new Date(lastUse ?? "");
   if (Number.isNaN(then.getTime())) return "";
   if (then.toDateString() === now.toDateString()) return `today ${then.toLocaleTimeString("en-US", TIME)}`;
   const yesterday = new Date(now);

@@ -1,7 +1,7 @@
 import { beforeEach, expect, test, vi } from "vitest";
 import { actionOf, sweepCommand } from "../../src/state/drops";
 import { byWorld, pictureAddress } from "../../src/state/gallery.svelte";
-import { forget, openedText, placeOf, recents, remember, rememberPicture } from "../../src/state/recents";
+import { forget, lastUseText, placeOf, recents, remember, rememberPicture } from "../../src/state/recents";
 import { curveStyles, runLabels } from "../../src/charts/runs";
 import { bytes } from "../../src/format";
 import type { FileEntry, FileKind, OpenTarget } from "../../src/protocol";
@@ -46,14 +46,14 @@ test("a picture that is too large, or none, is not kept", () => {
 test("entries of an earlier page and of a broken store are no error", () => {
   stored.set("sidestep.recent", JSON.stringify([{ path: "old" }, null, { target: OFFICE, name: "Office" }]));
   expect(recents().map(({ name }) => name)).toEqual(["Office"]);
-  expect(openedText(recents()[0]!.opened)).toBe("");
+  expect(lastUseText(recents()[0]!.opened)).toBe("");
   stored.set("sidestep.recent", "{");
   expect(recents()).toEqual([]);
 });
 
 test("times are as brief as can be understood", () => {
   const now = new Date(2026, 5, 10, 15, 30);
-  const text = (...parts: [number, number, number, number]) => openedText(new Date(...parts).toISOString(), now);
+  const text = (...parts: [number, number, number, number]) => lastUseText(new Date(...parts).toISOString(), now);
   expect([text(2026, 5, 10, 9), text(2026, 5, 9, 23), text(2026, 4, 2, 9), text(2024, 0, 31, 9)]).toEqual([
     "today 09:00",
     "yesterday 23:00",
