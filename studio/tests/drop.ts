@@ -5,15 +5,15 @@ import type { Page } from "playwright-core";
 type Content = string | Uint8Array;
 
 /** Files by their names, and folders, which have files by their names. */
-export type DroppedItems = Record<string, Content | Record<string, Content>>;
+export type DropItems = Record<string, Content | Record<string, Content>>;
 
-const isContent = (content: DroppedItems[string]): content is Content =>
+const isContent = (content: DropItems[string]): content is Content =>
   typeof content === "string" || content instanceof Uint8Array;
 
 const base64 = (content: Content): string => Buffer.from(content).toString("base64");
 
 /** The same with contents as text that a page can be handed. */
-function encoded(items: DroppedItems): Record<string, string | Record<string, string>> {
+function encode(items: DropItems): Record<string, string | Record<string, string>> {
   const entries = Object.entries(items).map(([name, content]) => {
     if (isContent(content)) return [name, base64(content)] as const;
     const files = Object.entries(content).map(([inner, bytes]) => [inner, base64(bytes)] as const);
@@ -23,7 +23,7 @@ function encoded(items: DroppedItems): Record<string, string | Record<string, st
 }
 
 /** Drops files and folders on the page. */
-export async function drop(page: Page, items: DroppedItems): Promise<void> {
+export async function drop(page: Page, items: DropItems): Promise<void> {
   await page.evaluate((dropped) => {
     interface Handed {
       isDirectory: boolean;
@@ -52,7 +52,7 @@ export async function drop(page: Page, items: DroppedItems): Promise<void> {
     });
     const transfer = {
       types: ["Files"],
-      items: entries.map((entry) => ({ webkitGetAsEntry: () => entry })),
+      items: entries.map((entry) => ({ kind: "file", webkitGetAsEntry: () => entry })),
       files: entries.map(({ name }) => new File([], name)),
       dropEffect: "none",
     };
@@ -61,5 +61,5 @@ export async function drop(page: Page, items: DroppedItems): Promise<void> {
       Object.defineProperty(event, "dataTransfer", { value: transfer });
       document.body.dispatchEvent(event);
     }
-  }, encoded(items));
+  }, encode(items));
 }

@@ -4,7 +4,7 @@ import { mkdirSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from "vitest";
 import { drawn, launch, openNew, openPage, WAIT_MS, type PageOptions } from "../browser";
-import { drop as dropOn, type DroppedItems } from "../drop";
+import { drop as dropOn, type DropItems } from "../drop";
 import { FakeServer } from "../fake/server";
 
 const server = new FakeServer("dist");
@@ -34,7 +34,7 @@ async function visit(look: PageOptions = {}): Promise<void> {
   await page.getByRole("button", { name: /^Office building/ }).waitFor();
 }
 
-const drop = (items: DroppedItems): Promise<void> => dropOn(page, items);
+const drop = (items: DropItems): Promise<void> => dropOn(page, items);
 
 const focusedCanvas = (): Promise<string | null> =>
   page.evaluate(() => (document.activeElement?.classList.contains("picture") ? "picture" : null));
@@ -78,7 +78,7 @@ test("what was opened is on the welcome page with its time and a picture, and ca
   await drawn(page);
   await page.getByRole("button", { name: /^Close/ }).click();
   const recent = page.getByRole("region", { name: "Recent" });
-  await recent.getByRole("button", { name: /today \d\d:\d\d.*shipped: robots/s }).waitFor();
+  await recent.getByRole("button", { name: /(today|yesterday) \d\d:\d\d.*shipped: robots/s }).waitFor();
   const source = await recent.locator("img").getAttribute("src");
   expect(source).toMatch(/^data:image\/(webp|png);base64,.{500,}/);
   // The picture shows the floor: it has more than one color.
@@ -111,6 +111,46 @@ test("after opening, the picture has the focus, and Space plays", async () => {
   await page.keyboard.press("Space");
   await page.getByRole("button", { name: "Pause" }).waitFor();
   expect(await page.getByRole("dialog").count()).toBe(0);
+});
+
+test("a picture that is shown again leaves the focus where it is", async () => {
+  await visit();
+  await openNew(page, "robots");
+  await expect.poll(focusedCanvas, { timeout: WAIT_MS }).toBe("picture");
+  await page.getByRole("button", { name: "Open…" }).click();
+  await page.getByRole("button", { name: /^sweep/ }).click();
+  await page.getByRole("complementary", { name: "Runs" }).waitFor();
+  await page.locator(".tab .name").first().click();
+  await drawn(page);
+  expect(await focusedCanvas()).toBeNull();
+});
+
+test("the place to drop on goes with the pointer, whatever was removed below it", async () => {
+  await visit();
+  const drag = (type: string, from: string, isOut = false): Promise<void> =>
+    page.evaluate(
+      ({ type, from, isOut }) => {
+        const transfer = new DataTransfer();
+        transfer.items.add(new File(["x"], "a.toml"));
+        const relatedTarget = isOut ? null : document.body;
+        const event = new DragEvent(type, { bubbles: true, cancelable: true, dataTransfer: transfer, relatedTarget });
+        document.querySelector(from)!.dispatchEvent(event);
+      },
+      { type, from, isOut },
+    );
+  const over = page.getByText("Drop to open");
+  await drag("dragenter", "body");
+  await drag("dragenter", ".card");
+  await over.waitFor();
+  await drag("dragleave", "body");
+  await over.waitFor();
+  // The card is never left: it is gone.
+  await page
+    .locator(".card")
+    .first()
+    .evaluate((card) => (card as HTMLElement).remove());
+  await drag("dragleave", "body", true);
+  await over.waitFor({ state: "detached" });
 });
 
 test("a dialog that is closed without a choice gives the focus back to its button", async () => {

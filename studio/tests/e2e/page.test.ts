@@ -84,6 +84,41 @@ describe("transport", () => {
     expect(consoleErrors).toEqual([]);
   });
 
+  test("headings of groups are reached and closed by keys, without a change of the selection", async () => {
+    await visit("robots");
+    const tree = page.getByRole("tree", { name: "Agents" });
+    const heading = tree.getByRole("treeitem", { name: /couriers/ });
+    const active = (): Promise<string | null> =>
+      tree.evaluate(
+        (one) => document.getElementById(one.getAttribute("aria-activedescendant") ?? "")?.textContent ?? null,
+      );
+    await tree.focus();
+    await page.keyboard.press("Home");
+    await expect.poll(active).toMatch(/couriers/);
+    await page.keyboard.press("ArrowDown");
+    const first = tree.getByRole("treeitem", { selected: true });
+    expect(await first.getAttribute("aria-posinset")).toBe("1");
+    expect(await first.getAttribute("aria-setsize")).toBe("8");
+    await page.keyboard.press("ArrowUp");
+    await expect.poll(active).toMatch(/couriers/);
+    expect(await first.count()).toBe(1);
+    await page.keyboard.press("Enter");
+    await expect.poll(() => heading.getAttribute("aria-expanded")).toBe("false");
+    await page.keyboard.press("ArrowRight");
+    await expect.poll(() => heading.getAttribute("aria-expanded")).toBe("true");
+    await page.keyboard.press(" ");
+    await expect.poll(() => heading.getAttribute("aria-expanded")).toBe("false");
+    expect(await page.getByRole("button", { name: "Play", exact: true }).count()).toBe(1);
+  });
+
+  test("the box of more options lies within a narrow page", async () => {
+    await visit("robots", { width: 400 });
+    await page.getByRole("button", { name: "More", exact: true }).click();
+    const box = (await page.getByRole("group", { name: "More display options" }).boundingBox())!;
+    expect(box.x).toBeGreaterThanOrEqual(0);
+    expect(box.x + box.width).toBeLessThanOrEqual(400);
+  });
+
   test("a run plays backwards and can be paused", async () => {
     await visit("robots");
     await page.getByRole("slider", { name: "Cycle" }).fill("800");

@@ -7,7 +7,7 @@ import { join, relative } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import { drawn, launch, openPage } from "../browser";
-import { drop, type DroppedItems } from "../drop";
+import { drop, type DropItems } from "../drop";
 import { BINARY, Program, SCENARIOS } from "./program";
 
 /** All files below a folder, by their paths in it. */
@@ -108,7 +108,7 @@ describe.skipIf(BINARY === "")("opening by the real program", () => {
     await page.context().close();
   });
 
-  const opens = async (items: DroppedItems, name: RegExp): Promise<Page> => {
+  const opens = async (items: DropItems, name: RegExp): Promise<Page> => {
     const { page, consoleErrors } = await visit();
     await drop(page, items);
     await page.locator(".tab.active .name").filter({ hasText: name }).waitFor();

@@ -173,10 +173,10 @@ test("few agents, and agents that can be seen, are no crowd", () => {
   expect([isCrowd(many, 0.5, 4), isCrowd(many, 0.5, 20), isCrowd(few, 0.5, 4)]).toEqual([true, false, false]);
 });
 
-test("agents are listed below their groups, which fold, and are found by the group's name", () => {
+test("agents are listed below their groups, which close, and are found by the group's name", () => {
   const all = bodies();
-  const words = (filter: string, folded: number[] = []): string[] =>
-    rowsOf(all, findAgents(all, filter), new Set(folded)).map((row) =>
+  const words = (filter: string, closed: number[] = []): string[] =>
+    rowsOf(all, findAgents(all, filter), new Set(closed)).map((row) =>
       row.kind === "group" ? `${row.name} ${row.count}` : all.name(row.index),
     );
   expect(words("")).toEqual(["couriers 2", "robot 0", "robot 1", "guards 2", "robot 2", "Anna"]);
@@ -184,4 +184,10 @@ test("agents are listed below their groups, which fold, and are found by the gro
   expect(words("guard")).toEqual(["guards 2", "robot 2", "Anna"]);
   expect(words("guard anna")).toEqual(["guards 1", "Anna"]);
   expect(words("nobody")).toEqual([]);
+});
+
+test("rows know their places, of which the page shows only some", () => {
+  const all = bodies();
+  const places = rowsOf(all, findAgents(all, ""), new Set([0])).map(({ place, places }) => `${place}/${places}`);
+  expect(places).toEqual(["1/2", "2/2", "1/2", "2/2"]);
 });

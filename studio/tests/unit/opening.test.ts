@@ -1,5 +1,5 @@
 import { beforeEach, expect, test, vi } from "vitest";
-import { actionOf, sweepCommand } from "../../src/state/drops";
+import { actionOf, itemsOf, sweepCommand } from "../../src/state/drops";
 import { byWorld, pictureAddress } from "../../src/state/gallery.svelte";
 import { forget, lastUseText, placeOf, recents, remember, rememberPicture } from "../../src/state/recents";
 import { curveStyles, runLabels } from "../../src/charts/runs";
@@ -65,6 +65,36 @@ test("times are as brief as can be understood", () => {
     "shipped: robots/hall",
     "defaults of chain",
   ]);
+});
+
+test("midnight is the first hour of a day", () => {
+  const now = new Date(2026, 5, 10, 0, 7);
+  expect(lastUseText(new Date(2026, 5, 10, 0, 5).toISOString(), now)).toBe("today 00:05");
+  expect(lastUseText(new Date(2026, 5, 9, 0, 0).toISOString(), now)).toBe("yesterday 00:00");
+});
+
+/** What a browser hands over, of files and texts. */
+function transferOf(...items: { kind: "file" | "string"; entry?: object; name?: string }[]): DataTransfer {
+  const files = items.flatMap(({ kind, name }) => (kind === "file" ? [{ name } as File] : []));
+  const handed = items.map(({ kind, entry }) => ({ kind, webkitGetAsEntry: () => entry ?? null }));
+  return { items: handed, files } as unknown as DataTransfer;
+}
+
+test("a text that is dropped with files takes the place of none", async () => {
+  const hall = { isDirectory: false, name: "hall.toml", file: (then: (file: File) => void) => then({} as File) };
+  const items = await itemsOf(transferOf({ kind: "string" }, { kind: "file", entry: hall, name: "hall.toml" }));
+  expect(items).toEqual([{ name: "hall.toml", files: [{ path: "hall.toml", file: {} }] }]);
+});
+
+test("a dropped file or folder that cannot be read is named", async () => {
+  const gone = new Error("NotFoundError");
+  const file = { isDirectory: false, name: "a.toml", file: (_: unknown, fail: (error: Error) => void) => fail(gone) };
+  const readEntries = (_: unknown, fail: (error: Error) => void): void => fail(gone);
+  const folder = { isDirectory: true, name: "runs", createReader: () => ({ readEntries }) };
+  for (const entry of [file, folder])
+    await expect(itemsOf(transferOf({ kind: "file", entry, name: entry.name }))).rejects.toMatchObject({
+      problem: { place: entry.name, cause: "could not be read" },
+    });
 });
 
 test("every kind of file is opened as people expect, or they are told what would be right", () => {

@@ -12,7 +12,7 @@ import {
   type SessionStatus,
 } from "../../src/protocol";
 import { decodeChunk, frameBytes } from "../../src/replay/chunk";
-import { formatLink, parseLink } from "../../src/replay/link.svelte";
+import { formatLink, LinkRequest, parseLink } from "../../src/replay/link.svelte";
 import { partsOf } from "../../src/replay/parts";
 import { ByteReader, decodePlane } from "../../src/replay/plane";
 import { selectTable } from "../../src/replay/tables";
@@ -327,6 +327,18 @@ test("links hold a cycle and an agent", () => {
   expect(formatLink({ cycle: 5, agent: "chain/0/17" })).toBe("cycle=5&agent=chain/0/17");
   expect(formatLink({ cycle: null, agent: "a&b" })).toBe("agent=a%26b");
   expect(parseLink("")).toEqual({ cycle: null, agent: null });
+});
+
+test("the cycle of a link waits for all runs, and its agent for its body, each by itself", async () => {
+  const { bodies } = (await opened()).active!.frames;
+  const request = new LinkRequest(parseLink("#cycle=12"));
+  expect(request.takeAgent(bodies!)).toBeNull();
+  expect([request.takeCycle(), request.takeCycle()]).toEqual([12, null]);
+  const both = new LinkRequest(parseLink("#cycle=12&agent=3"));
+  expect(both.takeAgent(bodies!)).toEqual(robot(3));
+  expect([both.takeAgent(bodies!), both.takeCycle()]).toEqual([null, 12]);
+  const unknown = new LinkRequest(parseLink("#agent=99"));
+  expect([unknown.takeCycle(), unknown.takeAgent(bodies!)]).toEqual([null, null]);
 });
 
 test("metrics of agents are those of the last cycle that has a row, and unknown ones are told the known", async () => {
