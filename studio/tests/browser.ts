@@ -5,6 +5,19 @@ import { chromium, type Browser, type Page } from "playwright-core";
 /** Maximum wait: software rendering is slow on a busy machine. */
 export const WAIT_MS = Number(process.env.WAIT_MS ?? 60_000);
 
+/** Widths and whether it is dark, for what looks the same in others; MANY=1 for all of them. */
+export const LOOKS: readonly (readonly [number, boolean])[] = process.env.MANY
+  ? [
+      [1280, false],
+      [1280, true],
+      [400, false],
+      [400, true],
+    ]
+  : [
+      [1280, false],
+      [400, true],
+    ];
+
 export function launch(): Promise<Browser> {
   return chromium.launch({
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",

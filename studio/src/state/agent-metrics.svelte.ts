@@ -12,6 +12,8 @@ export class AgentMetrics {
   names = $state.raw<MetricName[] | null>(null);
   values = $state.raw<AgentValues | null>(null);
   #isFetching = false;
+  /** The cycle of the last request for values. */
+  #askedCycle = -1;
   readonly #pace = new Pace();
   #age = 0;
 
@@ -20,6 +22,7 @@ export class AgentMetrics {
     this.values = null;
     this.#age++;
     this.#isFetching = false;
+    this.#askedCycle = -1;
     this.#pace.reset();
   }
 
@@ -32,8 +35,13 @@ export class AgentMetrics {
   /** Fetches the values of a metric at a cycle, if those that are known are of another one. */
   async fetchValues(metric: string, cycle: number, ask: FetchMetrics): Promise<void> {
     const { values } = this;
-    if (values?.key === metric && values.cycle === cycle) return;
-    if (values?.key === metric && !this.#pace.isDue) return;
+    if (values?.key === metric) {
+      if (values.cycle === cycle) this.#askedCycle = cycle;
+      // A recording may have no row of this cycle, and answers with an earlier one each time.
+      const isAnswered = this.#askedCycle === cycle && values.cycle <= cycle;
+      if (isAnswered || !this.#pace.isDue) return;
+    }
+    this.#askedCycle = cycle;
     await this.#fetch(metric, ask);
   }
 

@@ -100,6 +100,22 @@ describe("the canvas", () => {
     expect(consoleErrors).toEqual([]);
   });
 
+  test("all tools and what is done to an item are reached at a width that has no room for them", async () => {
+    await draws("robots", { width: 920 });
+    await hand.tool("Select");
+    await hand.click(1.5, 1);
+    const remove = page.getByRole("group", { name: "Selected item" }).getByRole("button", { name: "Delete" });
+    await remove.waitFor();
+    await page.getByRole("group", { name: "Tools" }).hover();
+    await page.mouse.wheel(2000, 0);
+    const right_px = async (): Promise<number> => {
+      const box = (await remove.boundingBox())!;
+      const bar = (await page.locator(".bar", { has: remove }).boundingBox())!;
+      return box.x + box.width - bar.x - bar.width;
+    };
+    await expect.poll(right_px).toBeLessThanOrEqual(0);
+  });
+
   test("robots are placed, moved, rotated and removed; a door replaces a part of a wall", async () => {
     await draws("robots");
     await hand.tool("Robot");

@@ -5,8 +5,11 @@ import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, expect, test } from "vitest";
 import { drawn, launch, openNew, openPage } from "../browser";
 import { FakeServer } from "../fake/server";
+import { readImage, type Color } from "../pixels";
 import { framesOf, meanDifference, picturesOf } from "../webm";
 
+/** Where the legend of an image is, at twice the size. */
+const LEGEND = { width_px: 600, height_px: 200 };
 const server = new FakeServer("dist");
 let browser: Browser;
 let page: Page;
@@ -47,46 +50,13 @@ async function save(button: string): Promise<{ name: string; bytes: Buffer }> {
   return { name: file.suggestedFilename(), bytes: readFileSync((await file.path())!) };
 }
 
-interface Image {
-  width: number;
-  height: number;
-  /** Red, green, blue and opacity of each pixel of its upper right corner, 600 x 200 pixels. */
-  corner: number[];
-  colors: number;
-}
-
-function readImage(bytes: Buffer): Promise<Image> {
-  return page.evaluate(
-    async (url) => {
-      const image = new Image();
-      image.src = url;
-      await image.decode();
-      const { width, height } = image;
-      const canvas = Object.assign(document.createElement("canvas"), { width, height });
-      const pen = canvas.getContext("2d", { willReadFrequently: true })!;
-      pen.drawImage(image, 0, 0);
-      const colors = new Set(new Uint32Array(pen.getImageData(0, 0, width, height).data.buffer)).size;
-      return { width, height, corner: [...pen.getImageData(width - 600, 0, 600, 200).data], colors };
-    },
-    `data:image/png;base64,${bytes.toString("base64")}`,
-  );
-}
-
-/** Number of pixels near a color. */
-function pixelsOf(data: number[], [r, g, b]: [number, number, number]): number {
-  let count = 0;
-  for (let i = 0; i < data.length; i += 4)
-    if (Math.max(Math.abs(data[i]! - r), Math.abs(data[i + 1]! - g), Math.abs(data[i + 2]! - b)) < 12) count++;
-  return count;
-}
-
 /** The colors of the legend that the page shows. */
-function legendColors(): Promise<[number, number, number][]> {
+function legendColors(): Promise<Color[]> {
   return page
     .locator(".legend .swatch")
     .evaluateAll((swatches) =>
       swatches.map((one) => getComputedStyle(one).borderTopColor.match(/\d+/g)!.slice(0, 3).map(Number)),
-    ) as Promise<[number, number, number][]>;
+    ) as unknown as Promise<Color[]>;
 }
 
 for (const width of [1280, 400]) {
@@ -98,7 +68,7 @@ for (const width of [1280, 400]) {
       page.locator("canvas.picture").evaluate((one: HTMLCanvasElement) => [one.width, one.height]);
     const before = await canvas();
     await page.getByRole("button", { name: "Export…" }).click();
-    const plain = await readImage((await save("Image (PNG)")).bytes);
+    const plain = (await save("Image (PNG)")).bytes;
     await page.keyboard.press("Escape");
     await page.locator(".agents").getByRole("option").nth(2).click();
     await page.locator(".legend").waitFor({ state: "attached" });
@@ -107,12 +77,12 @@ for (const width of [1280, 400]) {
     await page.getByRole("button", { name: "Export…" }).click();
     const { name, bytes } = await save("Image (PNG)");
     writeFileSync(`screenshots/image-${width}.png`, bytes);
-    const image = await readImage(bytes);
+    const without = await readImage(page, plain, colors, LEGEND);
+    const image = await readImage(page, bytes, colors, LEGEND);
     expect(name).toMatch(/^[\w.-]+-300\.png$/);
     expect([image.width, image.height]).toEqual(size.map((side) => 2 * side));
     expect(image.colors).toBeGreaterThan(20);
-    for (const color of colors)
-      expect(pixelsOf(image.corner, color)).toBeGreaterThan(pixelsOf(plain.corner, color) + 20);
+    image.counts.forEach((count, k) => expect(count).toBeGreaterThan(without.counts[k]! + 20));
     expect(await canvas()).toEqual(before);
     expect(consoleErrors).toEqual([]);
   });

@@ -4,6 +4,7 @@ import { readFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
 import { drawn, launch, openNew, openPage, WAIT_MS, type PageOptions } from "../browser";
+import { readImage } from "../pixels";
 import { FakeServer, PARTING } from "../fake/server";
 
 const server = new FakeServer("dist");
@@ -414,19 +415,7 @@ describe("results", () => {
     const file = await picture;
     expect(file.suggestedFilename()).toBe("Made-up-hall-50.png");
     const bytes = readFileSync((await file.path())!);
-    const colors = await page.evaluate(
-      async (url) => {
-        const image = new Image();
-        image.src = url;
-        await image.decode();
-        const canvas = document.createElement("canvas");
-        [canvas.width, canvas.height] = [image.width, image.height];
-        const pen = canvas.getContext("2d")!;
-        pen.drawImage(image, 0, 0);
-        return new Set(new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size;
-      },
-      `data:image/png;base64,${bytes.toString("base64")}`,
-    );
+    const { colors } = await readImage(page, bytes);
     expect(colors).toBeGreaterThan(20);
     expect(await dialog.getByRole("link", { name: "cycle 50 (SVG)" }).getAttribute("href")).toBe(
       "/export?path=robots.run&as=svg&cycle=50",

@@ -4,15 +4,13 @@ import { execFile } from "node:child_process";
 import { promisify } from "node:util";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test, vi } from "vitest";
-import { WebSocket } from "ws";
-import type { Socket } from "../../src/connection";
-import { Studio } from "../../src/state/studio.svelte";
 import { drawn, launch, openPage } from "../browser";
 import { BINARY, Program, SCENARIOS } from "./program";
+import { connectStudio, type StudioOfTest } from "./studio";
 
 const run = promisify(execFile);
 const CYCLES = 50;
-const timers: ReturnType<typeof setInterval>[] = [];
+const connections: StudioOfTest[] = [];
 
 type Metrics = Record<string, unknown>;
 
@@ -23,24 +21,11 @@ async function printedMetrics(file: string, cycles: number): Promise<Metrics> {
 }
 
 /** The number that a chart shows of a metric, by its dotted name. */
-function charted(metrics: Metrics, key: string): number | null {
+function chartValue(metrics: Metrics, key: string): number | null {
   const value = key.split(".").reduce<unknown>((at, part) => (at as Metrics | undefined)?.[part], metrics);
-  if (value === undefined) return (charted(metrics, key.replace(/_count$/, "")) ?? null) as number | null;
+  if (value === undefined) return (chartValue(metrics, key.replace(/_count$/, "")) ?? null) as number | null;
   if (Array.isArray(value)) return value.length;
   return typeof value === "boolean" ? Number(value) : (value as number | null);
-}
-
-async function connected(program: Program): Promise<Studio> {
-  const studio = new Studio({
-    open: () => new WebSocket(`${program.url.replace(/^http/, "ws")}socket`) as unknown as Socket,
-    after: (ms, then) => setTimeout(then, ms),
-    cancel: (timer) => clearTimeout(timer as NodeJS.Timeout),
-    accessStatus: () => Promise.resolve("in"),
-  });
-  studio.connect();
-  await vi.waitUntil(() => studio.isConnected, { timeout: 20_000 });
-  timers.push(setInterval(() => studio.sessions.forEach((one) => one.frames.grantHidden()), 50));
-  return studio;
 }
 
 describe.skipIf(BINARY === "")("charts", () => {
@@ -51,7 +36,7 @@ describe.skipIf(BINARY === "")("charts", () => {
     browser = await launch();
   });
   afterAll(async () => {
-    timers.forEach(clearInterval);
+    connections.forEach((one) => one.stop());
     await browser?.close();
     await program?.stop();
   });
@@ -63,7 +48,9 @@ describe.skipIf(BINARY === "")("charts", () => {
   ] as const)
     test(`of ${name} equal the command's metrics at ${CYCLES} cycles`, { timeout: 300_000 }, async () => {
       const path = `${SCENARIOS}/${name}`;
-      const studio = await connected(program);
+      const connection = await connectStudio(program);
+      connections.push(connection);
+      const { studio } = connection;
       expect(await studio.open({ kind: "scenario", path })).toBe(true);
       const session = studio.sessions[0]!;
       session.playback.play();
@@ -79,7 +66,7 @@ describe.skipIf(BINARY === "")("charts", () => {
         );
         const printed = await printedMetrics(path, cycle);
         for (const { key } of session.metrics.names)
-          expect([key, session.metrics.valueAt(key, cycle)]).toEqual([key, { cycle, value: charted(printed, key) }]);
+          expect([key, session.metrics.valueAt(key, cycle)]).toEqual([key, { cycle, value: chartValue(printed, key) }]);
       }
     });
 
@@ -95,7 +82,7 @@ describe.skipIf(BINARY === "")("charts", () => {
       await value.waitFor();
       const key = await page.locator(".chart select").first().inputValue();
       const printed = await printedMetrics(`${SCENARIOS}/robots/office.toml`, cycle);
-      expect([key, Number(await value.getAttribute("data-value"))]).toEqual([key, charted(printed, key)]);
+      expect([key, Number(await value.getAttribute("data-value"))]).toEqual([key, chartValue(printed, key)]);
     }
     await page.screenshot({ path: "screenshots/real-charts.png" });
     expect(consoleErrors).toEqual([]);

@@ -1,25 +1,10 @@
 /** The first difference of two runs of the real program. No browser is needed. */
 
-import { afterAll, beforeAll, describe, expect, test, vi } from "vitest";
-import { WebSocket } from "ws";
-import type { Socket } from "../../src/connection";
-import { Studio } from "../../src/state/studio.svelte";
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import { BINARY, Program, SCENARIOS } from "./program";
+import { connectStudio, type StudioOfTest } from "./studio";
 
-const timers: ReturnType<typeof setInterval>[] = [];
-
-async function connected(program: Program): Promise<Studio> {
-  const studio = new Studio({
-    open: () => new WebSocket(`${program.url.replace(/^http/, "ws")}socket`) as unknown as Socket,
-    after: (ms, then) => setTimeout(then, ms),
-    cancel: (timer) => clearTimeout(timer as NodeJS.Timeout),
-    accessStatus: () => Promise.resolve("in"),
-  });
-  studio.connect();
-  await vi.waitUntil(() => studio.isConnected, { timeout: 20_000 });
-  timers.push(setInterval(() => studio.sessions.forEach((one) => one.frames.grantHidden()), 50));
-  return studio;
-}
+const connections: StudioOfTest[] = [];
 
 describe.skipIf(BINARY === "")("the real program", () => {
   let program: Program;
@@ -27,12 +12,14 @@ describe.skipIf(BINARY === "")("the real program", () => {
     program = await Program.start(SCENARIOS);
   });
   afterAll(async () => {
-    timers.forEach(clearInterval);
+    connections.forEach((one) => one.stop());
     await program?.stop();
   });
 
   test("two runs that differ in one key are equal before the found cycle, and differ in it", async () => {
-    const studio = await connected(program);
+    const connection = await connectStudio(program);
+    connections.push(connection);
+    const { studio } = connection;
     const path = `${SCENARIOS}/robots/crossing.toml`;
     for (let i = 0; i < 2; i++) expect(await studio.open({ kind: "scenario", path })).toBe(true);
     const [a, b] = studio.sessions as [(typeof studio.sessions)[0], (typeof studio.sessions)[0]];

@@ -8,7 +8,8 @@ import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
-import { drawn, launch, openPage } from "../browser";
+import { drawn, launch, LOOKS, openPage } from "../browser";
+import { colorsOfImages } from "../pixels";
 import { BINARY, SCENARIOS } from "./program";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -63,12 +64,7 @@ describe.skipIf(BINARY === "")("the runs of a sweep as pages", () => {
     return { page, errors: consoleErrors, requests };
   }
 
-  for (const [width, isDark] of [
-    [1280, false],
-    [1280, true],
-    [400, false],
-    [400, true],
-  ] as const) {
+  for (const [width, isDark] of LOOKS) {
     test(`at ${width} pixels, ${isDark ? "dark" : "light"}, without findings of axe`, async () => {
       const { page, errors, requests } = await openIndex(width, isDark);
       expect(await page.locator(".matrix td[data-run]").count()).toBe(16);
@@ -124,9 +120,9 @@ describe.skipIf(BINARY === "")("the runs of a sweep as pages", () => {
     await page.getByLabel("with a replay").check();
     expect(await page.locator(".all tbody tr:visible").count()).toBe(6);
     await page.getByLabel("outliers", { exact: true }).check();
-    expect(await page.locator(".all tbody tr:visible").count()).toBe(
-      await page.locator(".all tbody tr[data-outlier]").count(),
-    );
+    const outliers = await page.locator(".all tbody tr[data-outlier]").count();
+    expect(outliers).toBeGreaterThan(0);
+    expect(await page.locator(".all tbody tr:visible").count()).toBe(outliers);
     await page.context().close();
   });
 
@@ -147,20 +143,9 @@ describe.skipIf(BINARY === "")("the runs of a sweep as pages", () => {
 
   test("pictures of runs show something", async () => {
     const { page } = await openIndex();
-    const colors = await page.locator(".replays img").evaluateAll((images) =>
-      Promise.all(
-        images.map(async (image) => {
-          const picture = image as HTMLImageElement;
-          await picture.decode();
-          const canvas = document.createElement("canvas");
-          [canvas.width, canvas.height] = [picture.naturalWidth, picture.naturalHeight];
-          const pen = canvas.getContext("2d")!;
-          pen.drawImage(picture, 0, 0);
-          return new Set(new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer)).size;
-        }),
-      ),
-    );
-    for (const count of colors) expect(count).toBeGreaterThan(8);
+    const colors = await colorsOfImages(page.locator(".replays img"));
+    expect(colors.length).toBe(6);
+    for (const count of colors) expect(count).toBeGreaterThan(3);
     await page.context().close();
   });
 });

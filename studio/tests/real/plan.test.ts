@@ -77,9 +77,22 @@ describe.skipIf(BINARY === "")("the real program", () => {
     await seek(page, 40);
     const view = page.locator(".view");
     await expect.poll(() => view.getAttribute("data-blocks"), { timeout: WAIT_MS }).not.toBe(null);
+    // The legend of colors leaves the profile free.
+    const legend = page.getByRole("region", { name: "Colors" });
+    const bottom_px = async (): Promise<number> => {
+      const box = (await legend.boundingBox())!;
+      return box.y + box.height;
+    };
+    await page.getByLabel("Colors", { exact: true }).selectOption("speed");
+    await legend.waitFor();
+    const withProfile_px = await bottom_px();
     await page.getByRole("checkbox", { name: "profile" }).uncheck();
-    await page.getByRole("button", { name: "3-D" }).click();
+    await expect.poll(bottom_px, { timeout: WAIT_MS }).toBeGreaterThan(withProfile_px + 60);
+    const toSpace = page.getByRole("button", { name: "3-D" });
+    await toSpace.click();
     await drawn(page);
+    // The picture that is made anew does not take the focus.
+    expect(await toSpace.evaluate((button) => document.activeElement === button)).toBe(true);
     expect(await view.getAttribute("data-blocks")).toBe(null);
     await page.screenshot({ path: "screenshots/plan-3d.png" });
     await page.getByRole("button", { name: "3-D" }).click();

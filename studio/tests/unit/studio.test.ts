@@ -266,6 +266,7 @@ test("steps requested faster than they complete add up, forward and backward, wi
 });
 
 test("a session that is closed while rewinding reports nothing and requests nothing more", async () => {
+  vi.useFakeTimers();
   show(500);
   session().selection.select({ kind: "robot", number: 0, part: null });
   session().playback.rewind();
@@ -277,7 +278,8 @@ test("a session that is closed while rewinding reports nothing and requests noth
   const sent = socket().sent.length;
   const problem = { place: "session", cause: "the session was closed", remedy: "", is_warning: false };
   for (const { id } of socket().sent.splice(0)) socket().sendToPage({ id, problem });
-  await new Promise((then) => setTimeout(then, 300));
+  await vi.advanceTimersByTimeAsync(300);
+  vi.useRealTimers();
   expect([sent > 0, socket().sent, studio.problems, closed.playback.isMoving]).toEqual([true, [], [], false]);
 });
 
