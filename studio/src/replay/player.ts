@@ -47,6 +47,8 @@ export class ReplayPlayer {
   #tableSent = 0;
   /** Counts commands: a seek that is not the last one has been replaced. */
   #commands = 0;
+  /** Counts seeks that have arrived: a frame that was read before the last one is no longer sent. */
+  #arrivals = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(id: number, recording: Recording, outbox: Outbox) {
@@ -100,7 +102,7 @@ export class ReplayPlayer {
       case "events":
         return this.#recording.events(call.from, call.until, call.skip ?? 0, call.limit);
       case "trails":
-        return this.#recording.trails(call.until);
+        return this.#recording.trails(call.until, call.bodies);
       case "source":
         return this.#recording.source();
       case "tables":
@@ -199,20 +201,19 @@ export class ReplayPlayer {
     if (command !== this.#commands) {
       throw refusal(`cycle ${this.#recording.cycleOf(frame)}`, "replaced by another request", "ask again to go there");
     }
-    this.#show(frame, false);
+    this.#arrivals++;
+    this.#frame = frame;
     this.#state = this.#isAtEnd ? "over" : "paused";
-    this.#isStale = true;
     // The page learns the cycle before the reply, and gets the frame after it: it tells by the reply that the frame
     // follows no other. While somebody scrubs, the next seek comes before the frame, which is sent nevertheless.
     this.#report();
-    setTimeout(() => void this.#send(), 0);
+    setTimeout(() => this.#refresh(), 0);
   }
 
-  #show(frame: number, sends = true): void {
+  #show(frame: number): void {
     if (frame === this.#frame) return;
     this.#frame = frame;
-    this.#isStale = true;
-    if (sends) void this.#send();
+    this.#refresh();
   }
 
   /** Sends the present frame, if it has not been sent and there is credit for it; one at a time. */
@@ -232,15 +233,17 @@ export class ReplayPlayer {
   }
 
   async #sendFrame(frame: number): Promise<void> {
+    const arrivals = this.#arrivals;
     const columns = await this.#recording.columns(frame);
     const cycle = this.#recording.cycleOf(frame);
     const text = await this.#scansAt(cycle);
-    if (columns.table !== this.#tableSent) {
-      const table = await this.#recording.table(columns.table);
+    const table = columns.table === this.#tableSent ? null : await this.#recording.table(columns.table);
+    // After the reply to a seek, the page takes the next frame for the one that it has asked for.
+    if (arrivals !== this.#arrivals || this.#credit === 0) return;
+    if (table) {
       this.#tableSent = columns.table;
       this.#outbox.notify({ notice: "bodies", ...table, session: this.#id });
     }
-    if (this.#credit === 0) return;
     this.#credit--;
     const time_s = cycle * this.#recording.run.scene.cycle_s;
     this.#outbox.frame(frameBytes(columns, { session: this.#id, cycle, time_s, text }));

@@ -146,13 +146,14 @@ export class Recording {
     throw new Error(`there is no body table ${id}: the file is not whole`);
   }
 
-  /** The reply to a request for the trails of all agents up to a cycle, from the last frames before it. */
-  async trails(until: number): Promise<ReplyBody> {
+  /** The reply to a request for the trails of some agents, or of all, up to a cycle, from the last frames before it. */
+  async trails(until: number, bodies: readonly BodyId[]): Promise<ReplyBody> {
     const last = this.frameUntil(until);
     const present = await this.table((await this.columns(last)).table);
-    const agents = present.is_agent.reduce((count, isAgent) => count + (isAgent ? 1 : 0), 0);
-    const frames = Math.min(MAX_TRAIL_FRAMES, Math.floor(MAX_TRAIL_POINTS / Math.max(1, agents)));
-    const trails = new TrailCollector(present);
+    const trails = new TrailCollector(present, bodies);
+    const agents = trails.trails.length;
+    if (agents === 0) return { is: "trails", trails: [] };
+    const frames = Math.min(MAX_TRAIL_FRAMES, Math.floor(MAX_TRAIL_POINTS / agents));
     let table = present;
     for (let frame = Math.max(0, last - frames + 1); frame <= last; frame++) {
       const columns = await this.columns(frame);

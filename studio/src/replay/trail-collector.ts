@@ -9,9 +9,14 @@ export class TrailCollector {
   /** The trail of each body of a table, which stays the same for many frames. */
   readonly #byTable = new Map<number, (BodyTrail | undefined)[]>();
 
-  /** Collects the trails of the agents of a table. */
-  constructor(present: BodyTable) {
-    for (const body of agentsOf(present)) if (body) this.#trails.set(bodyKey(body), { body, cycles: [], points_m: [] });
+  /** Collects the trails of some agents of a table; of all where none is named. */
+  constructor(present: BodyTable, bodies: readonly BodyId[]) {
+    const wanted = new Set(bodies.map(bodyKey));
+    for (const body of agentsOf(present)) {
+      if (!body) continue;
+      const key = bodyKey(body);
+      if (wanted.size === 0 || wanted.has(key)) this.#trails.set(key, { body, cycles: [], points_m: [] });
+    }
   }
 
   get trails(): BodyTrail[] {

@@ -5,6 +5,7 @@ import { expect, test, vi } from "vitest";
 import { decodeFrame } from "../../src/decode";
 import {
   VERSION,
+  type BodyId,
   type BodyTable,
   type ReplayFile,
   type ReplayInspection,
@@ -204,14 +205,18 @@ function agentPlane(): Uint8Array {
   return new Uint8Array([0, ...new Uint8Array(Float32Array.from(trips.flat()).buffer)]);
 }
 
-async function opened(): Promise<Studio> {
-  const studio = new Studio({
+function replayStudio(): Studio {
+  return new Studio({
     open: () => new ReplaySocket(partsOf(replayText())),
     after: () => undefined,
     cancel: () => undefined,
     accessStatus: () => Promise.resolve("in"),
     isReplay: true,
   });
+}
+
+async function opened(): Promise<Studio> {
+  const studio = replayStudio();
   studio.connect();
   await vi.waitUntil(() => studio.active?.frames.newest);
   return studio;
@@ -260,6 +265,28 @@ test("a replay opens by itself and goes to recorded cycles alone", async () => {
   await vi.waitUntil(() => session.run.status.state === "over");
   expect(session.run.status.digest).toBe("abc");
   studio.close(session);
+});
+
+test("after a seek at once, as an address asks for, the next frame is the one that was sought", async () => {
+  const studio = replayStudio();
+  studio.connect();
+  while (!studio.active?.client.isLive) await new Promise((then) => setImmediate(then));
+  const { frames, playback } = studio.active;
+  const seen: [number, boolean][] = [];
+  frames.subscribe(() => seen.push([frames.newest!.cycle, frames.isAfterSeek]));
+  await playback.seekTo(20);
+  frames.credit.refill();
+  await frames.waitForCycle(20);
+  expect(seen.at(-1)).toEqual([20, true]);
+});
+
+test("trails are those of the agents that were asked for, or of all", async () => {
+  const session = (await opened()).active!;
+  const trailsOf = (bodies: BodyId[]) => session.client.request({ do: "trails", until: 25, bodies });
+  const own = { body: robot(3), cycles: [0, 10, 20], points_m: [0, 0, 0, 1, 0, 0, 2, 0, 0] };
+  expect(await trailsOf([])).toEqual({ is: "trails", trails: [own] });
+  expect(await trailsOf([robot(3)])).toEqual({ is: "trails", trails: [own] });
+  expect(await trailsOf([robot(4)])).toEqual({ is: "trails", trails: [] });
 });
 
 test("while somebody scrubs, a frame comes for each seek", async () => {
