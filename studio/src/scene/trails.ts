@@ -22,8 +22,13 @@ export class Trails {
   #last = -Infinity;
   /** The interval of frames in cycles; shrinks slowly, because a pause ends on a shorter one. */
   #stride = 0;
-  /** Whether positions before the last frame were never displayed, and have to be asked for. */
-  #hasGap = false;
+  /** For each body, whether it lacks positions before the last frame, which have to be asked for. */
+  readonly #lacks: Uint8Array;
+  /** For each body, whether its ring has dropped positions. */
+  readonly #hasDropped: Uint8Array;
+  /** The number of the last gap, and the cycle up to which positions fill it. */
+  #gap = 0;
+  #gapCycle = 0;
 
   constructor(bodies: number, dimensions: 2 | 3) {
     this.bodies = bodies;
@@ -33,11 +38,19 @@ export class Trails {
     this.#cycles = new Float64Array(bodies * this.length);
     this.#begins = new Int32Array(bodies);
     this.#counts = new Int32Array(bodies);
+    this.#lacks = new Uint8Array(bodies);
+    this.#hasDropped = new Uint8Array(bodies);
   }
 
-  /** Whether the trails lack positions before the last frame. */
-  get hasGap(): boolean {
-    return this.#hasGap;
+  /** Returns whether some of these bodies lack positions before the last frame. */
+  hasGap(bodies: Iterable<number>): boolean {
+    for (const body of bodies) if (this.#lacks[body]) return true;
+    return false;
+  }
+
+  /** Counts gaps: what was asked for an earlier one does not fill this one. */
+  get gapNumber(): number {
+    return this.#gap;
   }
 
   /** The cycle of the last frame. */
@@ -55,7 +68,8 @@ export class Trails {
     if (gap < 0) this.#cut(cycle);
     else if (gap > maxGap) this.clear();
     // A seek skips positions, as does the first frame of a run that is not at its start.
-    if (gap > maxGap || (isSought && gap > 1)) this.#hasGap = cycle > 0;
+    if (gap > maxGap || (isSought && gap > 1)) this.#openGap(cycle);
+    else if (gap < 0 && isSought) this.#openCut(cycle);
     if (!isSought && Number.isFinite(gap)) this.#stride = Math.max(gap, this.#stride / 2);
     this.#last = cycle;
     for (let body = 0; body < this.bodies; body++) this.#push(body, cycle, places);
@@ -64,16 +78,36 @@ export class Trails {
   clear(): void {
     this.#begins.fill(0);
     this.#counts.fill(0);
+    this.#hasDropped.fill(0);
+  }
+
+  /** All bodies lack positions before a cycle, unless it is the first one. */
+  #openGap(cycle: number): void {
+    this.#gap++;
+    this.#gapCycle = cycle;
+    this.#lacks.fill(cycle > 0 ? 1 : 0);
+  }
+
+  /** After a seek back, bodies lack positions whose rings have dropped those before, and are half empty now. */
+  #openCut(cycle: number): void {
+    this.#gap++;
+    this.#gapCycle = cycle;
+    if (cycle === 0) return void this.#lacks.fill(0);
+    for (let body = 0; body < this.bodies; body++)
+      if (this.#hasDropped[body] && this.#counts[body]! < 0.5 * this.length) this.#lacks[body] = 1;
   }
 
   /** Takes over the trails of bodies that were there before under other numbers; `indexOf` returns the new ones. */
   adopt(before: Trails, indexOf: (body: number) => number | undefined): void {
     this.#last = before.#last;
     this.#stride = before.#stride;
-    this.#hasGap = before.#hasGap;
+    this.#gap = before.#gap;
+    this.#gapCycle = before.#gapCycle;
     for (let body = 0; body < before.bodies; body++) {
       const to = indexOf(body);
       if (to === undefined) continue;
+      this.#lacks[to] = before.#lacks[body]!;
+      this.#hasDropped[to] = before.#hasDropped[body]!;
       const points = before.points(body);
       const cycles = before.#cyclesOf(body);
       for (let i = Math.max(0, points.length - this.length); i < points.length; i++)
@@ -81,8 +115,17 @@ export class Trails {
     }
   }
 
-  /** Replaces the trails of some bodies up to a cycle, and keeps what was displayed since. */
-  load(trails: readonly BodyTrail[], until: number, indexOf: (trail: BodyTrail) => number | undefined): void {
+  /**
+   * Replaces the trails of some bodies up to a cycle, and keeps what was displayed since. `bodies` are those that were
+   * asked for, of which the others have no trail.
+   */
+  load(
+    trails: readonly BodyTrail[],
+    until: number,
+    bodies: Iterable<number>,
+    indexOf: (trail: BodyTrail) => number | undefined,
+  ): void {
+    if (until >= this.#gapCycle) for (const body of bodies) this.#lacks[body] = 0;
     for (const trail of trails) {
       const body = indexOf(trail);
       if (body === undefined) continue;
@@ -90,12 +133,13 @@ export class Trails {
       const cycles = this.#cyclesOf(body);
       const known = trail.cycles.findLastIndex((cycle) => cycle <= until);
       this.#begins[body] = this.#counts[body] = 0;
+      // It may begin later than the body: nobody knows what is before its first position.
+      this.#hasDropped[body] = trail.cycles[0]! > 0 ? 1 : 0;
       for (let i = Math.max(0, known + 1 - this.length); i <= known; i++)
         this.#append(body, trail.cycles[i]!, trail.points_m, 3 * i);
       const last = trail.cycles[known] ?? -Infinity;
       for (let i = 0; i < points.length; i++) if (cycles[i]! > last) this.#append(body, cycles[i]!, points[i]!, 0);
     }
-    this.#hasGap = false;
   }
 
   #push(body: number, cycle: number, places: Float32Array): void {
@@ -119,6 +163,7 @@ export class Trails {
       this.#counts[body] = count + 1;
     } else {
       slot = first + this.#begins[body]!;
+      this.#hasDropped[body] = 1;
       this.#begins[body] = (this.#begins[body]! + 1) % this.length;
     }
     for (let k = 0; k < d; k++) this.#places[slot * d + k] = places[from + k]!;

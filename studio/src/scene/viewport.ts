@@ -6,6 +6,7 @@ import type { BodyTrail, Inspection, Point3, MarkRole, Scene, BodyId } from "../
 import type { Bodies } from "../state/bodies";
 import type { Link } from "../fleet/links";
 import type { Projection, TrailMode } from "../state/display.svelte";
+import type { TrailRequest } from "../state/trail-source";
 import { PlaneCamera, SpaceCamera, type Extent, type Camera } from "./camera";
 import { BodyColors, type ColorOptions } from "./body-colors";
 import type { ColorLegend } from "./coloring";
@@ -101,8 +102,8 @@ export class Viewport {
   onMoved: () => void = () => undefined;
   /** Also called after each draw: overlays follow the camera. */
   readonly drawListeners = new Set<() => void>();
-  /** Called when trails are shown and lack positions before a cycle, which were never displayed. */
-  onTrailGap: (cycle: number) => void = () => undefined;
+  /** Called when trails that are shown lack positions, which were never displayed. */
+  onTrailGap: (request: TrailRequest) => void = () => undefined;
   /** Number of draws so far. */
   pictures = 0;
   readonly #projection: Projection;
@@ -121,6 +122,8 @@ export class Viewport {
   #bodies: Bodies | null = null;
   #frame: Frame | null = null;
   #trails: Trails | null = null;
+  /** The number of the gap that was asked for with the present mode and selection. */
+  #requestedGap: number | null = null;
   #colors: BodyColors | null = null;
   #legend = "";
   #options: ViewOptions = {
@@ -241,25 +244,37 @@ export class Viewport {
     this.requestDraw();
   }
 
-  /** Has the trails completed, if they are shown and have a gap. */
+  /** Has the trails completed that are shown and have a gap, once for each gap: while frames come, the reply is awaited. */
   #completeTrails(): void {
+    const bodies = this.#bodies;
     const trails = this.#trails;
-    if (trails?.hasGap && this.#options.trails !== "none") this.onTrailGap(trails.lastCycle);
+    if (!bodies || !trails || this.#requestedGap === trails.gapNumber) return;
+    const { trails: mode, selected } = this.#options;
+    if (!trails.hasGap(bodiesWithTrails(bodies, mode, selected))) return;
+    this.#requestedGap = trails.gapNumber;
+    this.onTrailGap({ until: trails.lastCycle, bodies: mode === "all" || !selected ? [] : [selected] });
   }
 
-  /** Takes trails up to a cycle, as the server knows them. */
-  loadTrails(received: readonly BodyTrail[], until: number): void {
+  /** Takes the trails of a request, as the server knows them. */
+  loadTrails(received: readonly BodyTrail[], { until, bodies: wanted }: TrailRequest): void {
+    const bodies = this.#bodies;
+    const trails = this.#trails;
     // The run has gone back since: these end later.
-    if (!this.#trails || this.#trails.lastCycle < until) return;
-    this.#trails.load(received, until, ({ body }) => this.#bodies?.find(body));
+    if (!bodies || !trails || trails.lastCycle < until) return;
+    const indices = wanted.flatMap((body) => bodies.find(body) ?? []);
+    const indexOf = ({ body }: BodyTrail): number | undefined => bodies.find(body);
+    trails.load(received, until, wanted.length === 0 ? bodies.agents : indices, indexOf);
     this.#marksChanged = true;
     this.requestDraw();
   }
 
   setOptions(options: ViewOptions): void {
-    const before = this.#options.trails;
+    const { trails, selected } = this.#options;
     this.#options = options;
-    if (options.trails !== before) this.#completeTrails();
+    if (options.trails !== trails || options.selected !== selected) {
+      this.#requestedGap = null;
+      this.#completeTrails();
+    }
     this.#reserveProfile();
     this.#focus();
     this.#marksChanged = true;

@@ -168,13 +168,22 @@ export class Session {
       .fetch(cycle, (from, until, skip, limit) => this.client.request({ do: "events", from, until, skip, limit }))
       .catch(ignore);
     this.eventSearch.refresh(this.events.total, this.findEvents).catch(ignore);
-    const askAgents = (metric: string | null): Promise<ReplyBody> =>
-      this.client.request({ do: "agent-metrics", metric });
-    this.agentMetrics.fetchNames(askAgents).catch(ignore);
+    this.agentMetrics.fetchNames(this.#askAgents).catch(ignore);
     const colorMetric = metricOf(this.display.colors);
-    if (colorMetric !== null) this.agentMetrics.fetchValues(colorMetric, this.frames.cycle, askAgents).catch(ignore);
+    if (colorMetric !== null)
+      this.agentMetrics.fetchValues(colorMetric, this.frames.cycle, this.#askAgents).catch(ignore);
     if (withMetrics && !this.isFleet)
       this.metrics.fetch((from) => this.client.request({ do: "metrics", from })).catch(ignore);
+  }
+
+  readonly #askAgents = (metric: string | null): Promise<ReplyBody> =>
+    this.client.request({ do: "agent-metrics", metric });
+
+  /** Has all that the picture of the shown frame consists of: trails, and the values that agents are colored by. */
+  async completePicture(): Promise<void> {
+    await this.trailSource.settle();
+    const metric = metricOf(this.display.colors);
+    if (metric !== null) await this.agentMetrics.completeValues(metric, this.frames.cycle, this.#askAgents);
   }
 
   /** Asks the server for the events with some words. */

@@ -1,5 +1,6 @@
 /** Records a video of what a view shows: cycle by cycle, in the time of the run and not in that of the machine. */
 
+import { tick } from "svelte";
 import type { Session } from "../state/session.svelte";
 import type { Viewport } from "../scene/viewport";
 import { WebmWriter } from "./webm";
@@ -85,6 +86,10 @@ export async function recordVideo(
       if (!hooks.shouldContinue()) return null;
       const reached = await session.playback.digestAt(cycle);
       if (reached === null || (await session.frames.waitForCycle(reached.cycle)) === null) return null;
+      // A new body table reaches the view with the page's next update, and so do values of agents.
+      await tick();
+      await session.completePicture();
+      await tick();
       const timestamp = Math.round((i * 1e6) / FRAMES_PER_S);
       const frame = new VideoFrame(viewport.compose(), { timestamp, visibleRect: { x: 0, y: 0, width, height } });
       encoder.encode(frame, { keyFrame: i % KEY_INTERVAL_FRAMES === 0 });

@@ -7,6 +7,7 @@ import { extname, join, normalize } from "node:path";
 import { WebSocketServer, type WebSocket } from "ws";
 import {
   VERSION,
+  type BodyId,
   type BodyTrail,
   type ClientRequest,
   type FileEntry,
@@ -20,6 +21,7 @@ import {
   type SessionStatus,
   type SweepRun,
 } from "../../src/protocol";
+import { bodyKey } from "../../src/format";
 import { bodyNames, findEvents } from "../../src/replay/search";
 import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
 import { declaredEditing } from "./editing";
@@ -111,15 +113,16 @@ class Run {
     this.text = textOf(world.scene.world);
   }
 
-  /** The trails of all agents up to a cycle. */
-  trails(until: number): ReplyBody {
+  /** The trails of some agents, or of all, up to a cycle. */
+  trails(until: number, bodies: readonly BodyId[]): ReplyBody {
     const { scene, table, columns } = this.world;
     const d = scene.dimensions;
     const trails = table.is_agent.flatMap((isAgent, index): (BodyTrail & { index: number })[] => {
       const part = table.part[index]!;
       const kind = table.kinds[table.kind[index]!]!;
       const body = { kind, number: table.number[index]!, part: part < 0 ? null : part };
-      return isAgent ? [{ body, cycles: [], points_m: [], index }] : [];
+      const isWanted = bodies.length === 0 || bodies.some((one) => bodyKey(one) === bodyKey(body));
+      return isAgent && isWanted ? [{ body, cycles: [], points_m: [], index }] : [];
     });
     for (let cycle = Math.max(0, until - 600); cycle <= until; cycle++) {
       const { positions_m } = columns(cycle);
@@ -581,7 +584,7 @@ function act(call: Exclude<SessionMethod, { do: "save" }>, run: Run): ReplyBody 
       run.goTo(run.cycle + call.cycles);
       return { is: "done" };
     case "trails":
-      return run.trails(call.until);
+      return run.trails(call.until, call.bodies);
     case "seek":
       run.goTo(call.cycle);
       return { is: "done" };

@@ -2,6 +2,7 @@
 
 import { expect, test } from "vitest";
 import type { MetricRow, ReplyBody } from "../../src/protocol";
+import { AgentMetrics } from "../../src/state/agent-metrics.svelte";
 import { Metrics } from "../../src/state/metrics.svelte";
 
 interface Rows {
@@ -84,4 +85,20 @@ test("a world that names no metrics shows its first ones", async () => {
     }),
   );
   expect(metrics.defaultKeys(2)).toEqual(["a", "b"]);
+});
+
+test("values of agents are asked for once in each cycle, though a replay answers with those of an earlier one", async () => {
+  const metrics = new AgentMetrics();
+  let asked = 0;
+  const ask = (): Promise<ReplyBody> => {
+    asked++;
+    return Promise.resolve({ is: "agent-metrics", names: [], cycle: 10, values: [1] });
+  };
+  await metrics.fetchValues("trips", 15, ask);
+  await metrics.fetchValues("trips", 15, ask);
+  expect([asked, metrics.values?.cycle]).toEqual([1, 10]);
+  // For a picture that is kept, a new cycle is asked for at once.
+  await metrics.completeValues("trips", 16, ask);
+  await metrics.completeValues("trips", 16, ask);
+  expect(asked).toBe(2);
 });

@@ -1,7 +1,11 @@
 /** Trails cover the displayed positions: in order, bounded, and correct after seeking back. */
 
-import { expect, test } from "vitest";
+import { describe, expect, test, vi } from "vitest";
+import { makeProblem, RequestError } from "../../src/connection";
+import type { ReplyBody } from "../../src/protocol";
 import { Trails } from "../../src/scene/trails";
+import type { SessionClient } from "../../src/state/session-client.svelte";
+import { TrailSource } from "../../src/state/trail-source";
 
 const at = (...numbers: number[]): Float32Array => Float32Array.from(numbers);
 
@@ -70,13 +74,13 @@ test("many bodies have short trails, which bounds memory", () => {
 test("what a seek skipped is asked for once, and then joined with what is displayed since", () => {
   const trails = new Trails(2, 3);
   trails.push(0, at(0, 0, 5, 9, 9, 9));
-  expect(trails.hasGap).toBe(false);
+  expect(trails.hasGap([0])).toBe(false);
   trails.push(5000, at(50, 0, 5, 9, 9, 9), true);
-  expect(trails.hasGap).toBe(true);
+  expect(trails.hasGap([0])).toBe(true);
   trails.push(5001, at(51, 0, 5, 9, 9, 9));
   const body = { kind: "airplane", number: 0, part: null };
-  trails.load([{ body, cycles: [0, 2500, 5000], points_m: [0, 0, 5, 25, 0, 5, 50, 0, 5] }], 5000, () => 0);
-  expect(trails.hasGap).toBe(false);
+  trails.load([{ body, cycles: [0, 2500, 5000], points_m: [0, 0, 5, 25, 0, 5, 50, 0, 5] }], 5000, [0, 1], () => 0);
+  expect(trails.hasGap([0])).toBe(false);
   expect(trails.points(0).map(([x]) => x)).toEqual([0, 25, 50, 51]);
   expect(trails.points(1)).toEqual([[9, 9, 9]]);
 });
@@ -84,10 +88,10 @@ test("what a seek skipped is asked for once, and then joined with what is displa
 test("a run that is opened later than at its start lacks positions", () => {
   const trails = new Trails(1, 2);
   trails.push(700, at(7, 0));
-  expect(trails.hasGap).toBe(true);
+  expect(trails.hasGap([0])).toBe(true);
   const atStart = new Trails(1, 2);
   atStart.push(0, at(0, 0));
-  expect(atStart.hasGap).toBe(false);
+  expect(atStart.hasGap([0])).toBe(false);
 });
 
 test("trails outlast a change of who is there: the others keep theirs under their new numbers", () => {
@@ -103,4 +107,72 @@ test("trails outlast a change of who is there: the others keep theirs under thei
     [3, 5],
   ]);
   expect(after.points(0)).toEqual([[8, 8]]);
+});
+
+test("after a seek back past what the ring holds, positions are asked for", () => {
+  const trails = new Trails(1000, 2);
+  for (let c = 0; c <= 2000; c++) trails.push(c, new Float32Array(2000).fill(c));
+  expect(trails.hasGap([0])).toBe(false);
+  const gaps = trails.gapNumber;
+  trails.push(500, new Float32Array(2000).fill(500), true);
+  expect(trails.hasGap([0])).toBe(true);
+  expect(trails.gapNumber).toBeGreaterThan(gaps);
+});
+
+test("a seek back within what is known needs no request, and none to the start", () => {
+  const trails = new Trails(1, 2);
+  for (let c = 0; c <= 400; c++) trails.push(c, at(c, 0));
+  trails.push(100, at(100, 0), true);
+  expect(trails.hasGap([0])).toBe(false);
+  trails.push(5000, at(9, 0), true);
+  expect(trails.hasGap([0])).toBe(true);
+  trails.push(0, at(0, 0), true);
+  expect(trails.hasGap([0])).toBe(false);
+});
+
+test("trails of one body do not fill the gap of the others, nor those of an earlier gap that of a later one", () => {
+  const trails = new Trails(2, 3);
+  trails.push(900, at(9, 0, 0, 5, 0, 0), true);
+  trails.push(1900, at(19, 0, 0, 5, 0, 0), true);
+  const body = { kind: "robot", number: 0, part: null };
+  trails.load([{ body, cycles: [900], points_m: [9, 0, 0] }], 900, [0], () => 0);
+  expect(trails.hasGap([0])).toBe(true);
+  trails.load([{ body, cycles: [900, 1900], points_m: [9, 0, 0, 19, 0, 0] }], 1900, [0], () => 0);
+  expect([trails.hasGap([0]), trails.hasGap([1])]).toEqual([false, true]);
+});
+
+describe("requests for trails", () => {
+  const one = { kind: "robot", number: 1, part: null };
+
+  function source(answers: Promise<ReplyBody>[]): { source: TrailSource; asked: unknown[] } {
+    const asked: unknown[] = [];
+    const request = (call: unknown) => {
+      asked.push(call);
+      return answers.shift()!;
+    };
+    return { source: new TrailSource({ isLive: true, request } as unknown as SessionClient), asked };
+  }
+
+  test("name the bodies that are shown, and a newer one replaces those that wait", async () => {
+    vi.useFakeTimers();
+    const got: number[] = [];
+    const { source: trails, asked } = source([Promise.resolve({ is: "trails", trails: [] })]);
+    for (const until of [100, 200]) trails.request({ until, bodies: [one] }, (_, request) => got.push(request.until));
+    await vi.advanceTimersByTimeAsync(1000);
+    vi.useRealTimers();
+    expect(asked).toEqual([{ do: "trails", until: 200, bodies: [one] }]);
+    expect(got).toEqual([200]);
+  });
+
+  test("are sent at once for a video, which waits for the reply; a refusal does not stop it", async () => {
+    const refusal = new RequestError(makeProblem("trails", "too many", "ask for fewer"));
+    const { source: trails, asked } = source([Promise.resolve({ is: "trails", trails: [] }), Promise.reject(refusal)]);
+    const got: number[] = [];
+    for (const until of [100, 200]) {
+      trails.request({ until, bodies: [] }, (_, request) => got.push(request.until));
+      await trails.settle();
+    }
+    await trails.settle();
+    expect([asked.length, got]).toEqual([2, [100]]);
+  });
 });
