@@ -7,9 +7,10 @@ import type { Bodies } from "../state/bodies";
 import type { AgentValues, ColorMode, DensityMode } from "../state/color-mode";
 import { PlaneCamera, type Camera } from "./camera";
 import { Coloring, type ColorLegend } from "./coloring";
-import { cellsOf, DensityLayer, isCrowd } from "./density";
+import { cellsOf, DensityLayer, doSymbolsCrowd, isCrowd } from "./density";
 import { flatRadiusOf } from "./extent";
 import type { Palette, Rgb } from "./palette";
+import { SYMBOL_PX } from "./plan";
 
 /** What a reader asks for. */
 export interface ColorOptions {
@@ -64,8 +65,9 @@ export class BodyColors {
   }
 
   /** Colors a frame. Returns whether bodies look different now. */
-  update(frame: Frame, { camera, size_px, options, palette }: Look): boolean {
-    const isDense = this.#showsDensity(camera, options.density);
+  update(frame: Frame, look: Look): boolean {
+    const { camera, size_px, options, palette } = look;
+    const isDense = this.#showsDensity(frame, look);
     const wanted = { frame, colors: options.colors, values: options.agentValues, palette, isDense };
     const isChanged = !isSame(wanted, this.#made);
     this.#made = wanted;
@@ -79,10 +81,12 @@ export class BodyColors {
     return isChanged;
   }
 
-  #showsDensity(camera: Camera, density: DensityMode): boolean {
+  #showsDensity(frame: Frame, { camera, size_px, options: { density } }: Look): boolean {
     if (density === "off" || !(camera instanceof PlaneCamera)) return false;
     if (density === "on") return true;
     const { table, agents } = this.#bodies;
+    // Traffic that is seen from above has symbols.
+    if (this.#scene.traffic !== null) return doSymbolsCrowd(frame, agents, camera, size_px, 2 * SYMBOL_PX);
     const size_m = agents.length === 0 ? 0 : 2 * flatRadiusOf(table.shapes[table.shape[agents[0]!]!]!);
     return isCrowd(this.#bodies, size_m, 1 / camera.mPerPx);
   }

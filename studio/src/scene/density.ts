@@ -52,6 +52,27 @@ export function isCrowd(bodies: Bodies, agentSize_m: number, pxPerM: number): bo
   return bodies.agents.length >= MIN_CROWD && agentSize_m * pxPerM <= MAX_DOT_PX;
 }
 
+/** Returns whether symbols that keep their size on the screen would cover it, as they are so many there. */
+export function doSymbolsCrowd(
+  frame: Frame,
+  agents: Uint32Array,
+  camera: PlaneCamera,
+  [width_px, height_px]: readonly [number, number],
+  symbol_px: number,
+): boolean {
+  if (agents.length < MIN_CROWD) return false;
+  const [left, top] = camera.at(0, 0);
+  const [right, bottom] = camera.at(width_px, height_px);
+  const { dimensions: d, positions_m } = frame;
+  let visible = 0;
+  for (const i of agents) {
+    const x = positions_m[d * i]!;
+    const y = positions_m[d * i + 1]!;
+    if (x >= left && x <= right && y >= bottom && y <= top) visible++;
+  }
+  return visible >= MIN_CROWD && visible * symbol_px * symbol_px > width_px * height_px;
+}
+
 /** The cells of the visible part of the plane, at round multiples of their side. */
 export function cellsOf(camera: PlaneCamera, [width_px, height_px]: readonly [number, number]): Cells {
   const side_m = roundUp(MIN_CELL_PX * camera.mPerPx);
@@ -76,9 +97,10 @@ export function countIn(
 ): { counts: Uint32Array; sums: Float64Array } {
   const counts = new Uint32Array(columns * rows);
   const sums = new Float64Array(values ? counts.length : 0);
+  const { dimensions: d, positions_m } = frame;
   for (const i of agents) {
-    const column = Math.floor((frame.positions_m[2 * i]! - x) / side_m);
-    const row = Math.floor((frame.positions_m[2 * i + 1]! - y) / side_m);
+    const column = Math.floor((positions_m[d * i]! - x) / side_m);
+    const row = Math.floor((positions_m[d * i + 1]! - y) / side_m);
     if (!(column >= 0 && column < columns && row >= 0 && row < rows)) continue;
     const cell = row * columns + column;
     counts[cell]!++;

@@ -91,9 +91,10 @@ export class Dots {
     }
   }
 
-  scale(pxPerM: number): void {
+  /** `ratio`: pixels of the canvas for each of the page. */
+  scale(pxPerM: number, ratio: number): void {
     this.#uniforms.pxPerM.value = pxPerM;
-    this.#uniforms.ratio.value = Math.min(2, window.devicePixelRatio);
+    this.#uniforms.ratio.value = ratio;
   }
 
   dispose(): void {

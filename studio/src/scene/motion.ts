@@ -40,11 +40,12 @@ export class Motion {
     return this.#first;
   }
 
-  /** Takes the positions of a frame. After a seek, or a gap, everything begins anew. */
+  /** Takes the positions of a frame. After a long gap, or a seek, everything begins anew. */
   push(cycle: number, positions_m: Float32Array, isSought: boolean): void {
     const gap = cycle - this.#cycle;
     if (gap === 0) return;
-    const maxGap = Math.max(isSought ? 0 : MAX_GAP_CYCLES, isSought ? 1 : MAX_GAP_GROWTH * this.#stride);
+    // A video seeks from frame to frame: within the window of means, a gap still tells of the motion.
+    const maxGap = isSought ? SPEED_WINDOW_CYCLES : Math.max(MAX_GAP_CYCLES, MAX_GAP_GROWTH * this.#stride);
     if (!(gap > 0 && gap <= maxGap)) return this.#restart(cycle, positions_m);
     this.#stride = gap;
     this.#cycle = cycle;

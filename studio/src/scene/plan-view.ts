@@ -37,7 +37,8 @@ export class PlanView {
   wordLayer(state: PlanState): WordLayer {
     const { frame, selected, hovered, profile_px, inspection } = state;
     const inspected = [inspection?.cycle, inspection?.marks.length];
-    const key = JSON.stringify([frame?.tableId, frame?.cycle, selected, hovered, profile_px, inspected]);
+    const look = this.painter.look;
+    const key = JSON.stringify([look, frame?.tableId, frame?.cycle, selected, hovered, profile_px, inspected]);
     const context = this.#context(state);
     return { key, draw: (pen) => this.#words.draw(pen, context) };
   }

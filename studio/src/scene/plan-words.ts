@@ -7,7 +7,7 @@ import { nearestPoint, placeBlocks, type BlockRequest, type LastPlaces, type Rec
 import { graticule, type GraticuleLine } from "./graticule";
 import { roundUp } from "./grid";
 import { css, packColor, ROLES, visibleColor, type Palette } from "./palette";
-import { alertInk, cssOfTint, SYMBOL_PX, type Aircraft, type PlanPainter } from "./plan";
+import { cssOfTint, SYMBOL_PX, type Aircraft, type PlanPainter } from "./plan";
 import { levelRange, timeAhead, unitsOf, verticalSymbol, type PlanUnits } from "./plan-units";
 import { drawProfile } from "./profile";
 import type { Strokes } from "./strokes";
@@ -203,7 +203,7 @@ export class PlanWords {
         pen.lineTo(endX, endY);
         pen.stroke();
       }
-      const ink = css(aircraft.isAlert ? alertInk(palette) : palette.ink);
+      const ink = painter.inkOf(aircraft, palette);
       pen.font = BOLD;
       this.#text(pen, lines[0], rect.x, rect.y + 0.5 * LINE_PX, palette, ink);
       pen.font = FONT;
@@ -225,7 +225,9 @@ export class PlanWords {
     const { camera, painter, size_px, profile_px, selected, hovered } = context;
     const rank = ({ index, isAlert }: Aircraft): number =>
       index === selected ? 0 : index === hovered ? 1 : isAlert ? 2 : 3;
-    const all = painter.aircraft().sort((a, b) => rank(a) - rank(b) || a.index - b.index);
+    const shown = painter.hidesAgents ? [] : painter.aircraft();
+    const { number: numbers } = painter.bodies!.table;
+    const all = shown.sort((a, b) => rank(a) - rank(b) || a.index - b.index);
     return all.flatMap((aircraft): Block[] => {
       const [x, y] = camera.project(aircraft.x_m, aircraft.y_m);
       if (x < 0 || y < 0 || x > size_px[0] || y > size_px[1] - profile_px) return [];
@@ -234,7 +236,8 @@ export class PlanWords {
       const first = pen.measureText(lines[0]).width;
       pen.font = FONT;
       const width = Math.max(first, pen.measureText(lines[1]).width);
-      return [{ key: aircraft.index, x, y, width, height: 2 * LINE_PX, aircraft, lines }];
+      // Indices shift as others come and go: a block keeps its place by the number of its aircraft.
+      return [{ key: numbers[aircraft.index]!, x, y, width, height: 2 * LINE_PX, aircraft, lines }];
     });
   }
 

@@ -6,11 +6,11 @@ import type { BodyId, Scene } from "../protocol";
 import type { Bodies } from "../state/bodies";
 import { flatRadiusOf } from "./extent";
 import { DART, DISC, Glyphs } from "./glyphs";
-import { packColor, tintsOf, visibleColor, type Palette } from "./palette";
+import { css, packColor, tintsOf, visibleColor, type Palette } from "./palette";
 import { lookahead_s } from "./plan-units";
 import { Strokes } from "./strokes";
 import { areaColor, fillArea, movingAreas, staticAreas, type DrawnArea } from "./traffic-areas";
-import type { Painter } from "./viewport";
+import type { Painter, ViewScale } from "./viewport";
 
 /** Half the length of a symbol. */
 export const SYMBOL_PX = 6.5;
@@ -53,11 +53,16 @@ export class PlanPainter implements Painter {
   /** The colors of bodies that do not have their usual ones. */
   #ownTints: Uint32Array | null = null;
   #hidesAgents = false;
+  /** Whether colors tell the state of each body. */
+  #tellsStates = false;
+  #look = 0;
   /** The zone of each agent, by the indices of bodies. */
   #zoneOf = new Map<number, number>();
   #selected: number | undefined;
   #hovered: number | undefined;
   #extent_m = 1;
+  /** Pixels of the canvas for each of the page, which all hatches share. */
+  readonly #ratio = { value: 1 };
 
   constructor(scene: Scene) {
     this.#scene = scene;
@@ -83,9 +88,22 @@ export class PlanPainter implements Painter {
     return lookahead_s(fastest_m_s, this.#extent_m);
   }
 
-  setColors(tints: Uint32Array | null, hidesAgents: boolean): void {
+  /** Counts changes of bodies and of their colors. */
+  get look(): number {
+    return this.#look;
+  }
+
+  get hidesAgents(): boolean {
+    return this.#hidesAgents;
+  }
+
+  setColors(tints: Uint32Array | null, hidesAgents: boolean, tellsStates = false): void {
+    const isSame = tints === this.#ownTints && hidesAgents === this.#hidesAgents && tellsStates === this.#tellsStates;
+    if (isSame) return;
+    this.#look++;
     this.#ownTints = tints;
     this.#hidesAgents = hidesAgents;
+    this.#tellsStates = tellsStates;
   }
 
   paint(palette: Palette): void {
@@ -96,6 +114,7 @@ export class PlanPainter implements Painter {
   }
 
   setBodies(bodies: Bodies): void {
+    this.#look++;
     this.#bodies = bodies;
     this.#frame = null;
     this.#zoneOf = zonesOf(bodies);
@@ -117,7 +136,8 @@ export class PlanPainter implements Painter {
     this.#drawMoving();
   }
 
-  scale(pxPerM: number, palette: Palette, height_px: number, width_px: number): void {
+  scale({ pxPerM, palette, width_px, height_px, ratio }: ViewScale): void {
+    this.#ratio.value = ratio;
     for (const glyphs of [this.#zones, this.#symbols]) glyphs.scale(pxPerM, palette);
     for (const strokes of [this.#borders, this.#routes, this.#vectors]) strokes.scale(pxPerM, width_px, height_px);
     this.#extent_m = Math.max(width_px, height_px) / pxPerM;
@@ -127,6 +147,12 @@ export class PlanPainter implements Painter {
   dispose(): void {
     this.#dropFills();
     for (const { quads } of [this.#borders, this.#routes, this.#zones, this.#vectors, this.#symbols]) quads.dispose();
+  }
+
+  /** The color of the words of an aircraft. */
+  inkOf({ index, isAlert }: Aircraft, palette: Palette): string {
+    if (!isAlert) return css(palette.ink);
+    return this.#tellsStates ? cssOfTint(this.tintOf(index)) : css(alertInk(palette));
   }
 
   /** The aircraft of the shown frame. */
@@ -144,10 +170,13 @@ export class PlanPainter implements Painter {
     }));
   }
 
-  /** The color of a body of the shown frame, as drawn, in its condition or another; an alert is one in all colorings. */
+  /**
+   * The color of a body of the shown frame, as drawn, in its condition or another. An alert is one in all colorings, but
+   * for that by states, in which the legend says what an alert looks like.
+   */
   tintOf(index: number, condition = this.#frame?.conditions[index] ?? 0): number {
     const own = this.#ownTints?.[index];
-    if (own && !ALERTS.includes(condition)) return own;
+    if (own && (this.#tellsStates || !ALERTS.includes(condition))) return own;
     const appearance = this.#bodies?.table.appearance[index] ?? 0;
     return this.#tints[5 * appearance + condition] ?? 0xff888888;
   }
@@ -171,7 +200,7 @@ export class PlanPainter implements Painter {
     this.#borders.begin();
     const tint = packColor(areaColor(palette), 0.9);
     for (const area of this.areas) {
-      if (!area.area.is_fence) this.#fills.add(fillArea(area, palette));
+      if (!area.area.is_fence) this.#fills.add(fillArea(area, palette, this.#ratio));
       for (const ring of area.rings_m)
         this.#borders.path(ring, area.area.is_fence ? 1.8 : 1.3, tint, area.area.is_fence);
     }
@@ -275,7 +304,7 @@ export function cssOfTint(tint: number): string {
   return `rgb(${tint & 255} ${(tint >>> 8) & 255} ${(tint >>> 16) & 255})`;
 }
 
-/** The color of the text of an alert. */
-export function alertInk(palette: Palette): [number, number, number] {
+/** The color of the text of an alert, where colors are not those of states. */
+function alertInk(palette: Palette): [number, number, number] {
   return visibleColor([0xd0, 0x10, 0x10], palette);
 }

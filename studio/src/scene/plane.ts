@@ -7,7 +7,7 @@ import type { Bodies } from "../state/bodies";
 import { Dots } from "./dots";
 import { BOX, DART, DISC, Glyphs } from "./glyphs";
 import { packAppearance, tintsOf, type Palette } from "./palette";
-import type { Painter } from "./viewport";
+import type { Painter, ViewScale } from "./viewport";
 
 /** Minimum half length in pixels: agents stay visible from far away. */
 const MIN_DART_PX = 7;
@@ -166,10 +166,10 @@ export class PlanePainter implements Painter {
     }
   }
 
-  scale(pxPerM: number, palette: Palette): void {
+  scale({ pxPerM, palette, ratio }: ViewScale): void {
     this.#static.scale(pxPerM, palette);
     this.#moving.scale(pxPerM, palette);
-    this.#dots.scale(pxPerM);
+    this.#dots.scale(pxPerM, ratio);
     if (pxPerM === this.#pxPerM) return;
     this.#pxPerM = pxPerM;
     const areDots = this.#forms.map((form) => isDot(form, pxPerM));

@@ -6,7 +6,7 @@ import type { Scene, Shape } from "../protocol";
 import type { Bodies } from "../state/bodies";
 import { packAppearance, tintsOf, type Palette } from "./palette";
 import { Solids, rotationTo, type SolidKind } from "./solids";
-import type { Painter } from "./viewport";
+import type { Painter, ViewScale } from "./viewport";
 
 const KINDS: readonly SolidKind[] = ["ball", "box", "cylinder", "dart"];
 
@@ -129,7 +129,7 @@ export class SpacePainter implements Painter {
     this.#moving.end();
   }
 
-  scale(_pxPerM: number, _palette: Palette, height_px: number): void {
+  scale({ height_px }: ViewScale): void {
     // Half a field of view of 20 degrees reaches over half the height.
     this.#moving.setMinRadius((MIN_BALL_PX * 2 * Math.tan(Math.PI / 9)) / Math.max(1, height_px));
   }

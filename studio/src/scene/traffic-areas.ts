@@ -1,6 +1,6 @@
 /** Areas of traffic: the borders that belong to each, filled and hatched in a plan. */
 
-import { BufferGeometry, DoubleSide, Float32BufferAttribute, Mesh, ShapeUtils, Vector2 } from "three";
+import { BufferGeometry, DoubleSide, Float32BufferAttribute, Mesh, ShapeUtils, Vector2, type IUniform } from "three";
 import type { Frame } from "../decode";
 import type { Point3, Scene, TrafficArea } from "../protocol";
 import type { Bodies } from "../state/bodies";
@@ -67,19 +67,21 @@ function areasOf(scene: Scene, borders: readonly Border[]): DrawnArea[] {
     const rings_m = own
       .filter(({ points_m }) => points_m[0]![2] === level)
       .map(({ points_m }) => points_m.map(([x, y]): [number, number] => [x, y]));
-    const [xs, ys] = [0, 1].map((axis) => rings_m.flatMap((ring) => ring.map((at) => at[axis]!))) as [
-      number[],
-      number[],
-    ];
-    return [
-      {
-        area,
-        rings_m,
-        low_m: [Math.min(...xs), Math.min(...ys)],
-        high_m: [Math.max(...xs), Math.max(...ys)],
-      },
-    ];
+    return [{ area, rings_m, ...boundsOf(rings_m) }];
   });
+}
+
+function boundsOf(rings_m: readonly Ring[]): Pick<DrawnArea, "low_m" | "high_m"> {
+  const low_m: [number, number] = [Infinity, Infinity];
+  const high_m: [number, number] = [-Infinity, -Infinity];
+  // A border may have more points than a call may have arguments.
+  for (const ring of rings_m)
+    for (const at_m of ring)
+      for (const axis of [0, 1] as const) {
+        low_m[axis] = Math.min(low_m[axis], at_m[axis]);
+        high_m[axis] = Math.max(high_m[axis], at_m[axis]);
+      }
+  return { low_m, high_m };
 }
 
 const VERTEX = `
@@ -88,13 +90,14 @@ void main() { gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 
 
 const FRAGMENT = `
 uniform vec3 ink;
+uniform float ratio;
 void main() {
-  float hatch = mod(gl_FragCoord.x + gl_FragCoord.y, 11.0) < 1.5 ? 0.26 : 0.0;
+  float hatch = mod((gl_FragCoord.x + gl_FragCoord.y) / ratio, 11.0) < 1.5 ? 0.26 : 0.0;
   color = vec4(ink, 0.09 + hatch);
 }`;
 
-/** Fills an area. The caller disposes of the mesh. */
-export function fillArea({ rings_m }: DrawnArea, palette: Palette): Mesh {
+/** Fills an area. `ratio` is the number of pixels for each of the page. The caller disposes of the mesh. */
+export function fillArea({ rings_m }: DrawnArea, palette: Palette, ratio: IUniform<number>): Mesh {
   const positions: number[] = [];
   const index: number[] = [];
   for (const { outer, holes } of polygonsOf(rings_m)) {
@@ -109,7 +112,7 @@ export function fillArea({ rings_m }: DrawnArea, palette: Palette): Mesh {
   geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
   geometry.setIndex(index);
   const [r, g, b] = areaColor(palette);
-  const uniforms = { ink: { value: [r / 255, g / 255, b / 255] } };
+  const uniforms = { ink: { value: [r / 255, g / 255, b / 255] }, ratio };
   const look = material({ vertex: VERTEX, fragment: FRAGMENT, uniforms, depth: false, transparent: true });
   look.side = DoubleSide;
   const mesh = new Mesh(geometry, look);

@@ -13,6 +13,7 @@ import type { ColorLegend } from "./coloring";
 import { extentOf, flatRadiusOf } from "./extent";
 import { FloorLayer } from "./floor";
 import { drawGrid } from "./grid";
+import { drawColorLegend } from "./color-legend";
 import { drawLegend } from "./legend";
 import { drawMarks, drawScans, fillAreas } from "./marks";
 import { Overlay, type Label } from "./overlay";
@@ -27,15 +28,28 @@ import { Strokes } from "./strokes";
 import { bodiesWithTrails, drawTrail } from "./trail-lines";
 import { Trails } from "./trails";
 
+/** The scale of a picture. */
+export interface ViewScale {
+  pxPerM: number;
+  palette: Palette;
+  width_px: number;
+  height_px: number;
+  /** Pixels of the canvas for each of the page: an image that is saved has more of them. */
+  ratio: number;
+}
+
 /** Draws the bodies of one kind of world. */
 export interface Painter {
   readonly group: Group;
   paint(palette: Palette): void;
   setBodies(bodies: Bodies, palette: Palette): void;
   frame(frame: Frame): void;
-  /** Sets colors for bodies instead of their own, none for those with 0, and whether agents are left out. */
-  setColors?(tints: Uint32Array | null, hidesAgents: boolean): void;
-  scale(pxPerM: number, palette: Palette, height_px: number, width_px: number): void;
+  /**
+   * Sets colors for bodies instead of their own, none for those with 0; whether agents are left out, and whether colors
+   * tell states.
+   */
+  setColors?(tints: Uint32Array | null, hidesAgents: boolean, tellsStates: boolean): void;
+  scale(scale: ViewScale): void;
   dispose(): void;
 }
 
@@ -85,10 +99,10 @@ function createLayers(scene: Scene, projection: Projection): [Painter, FloorLaye
   return [scene.dimensions === 2 ? new PlanePainter(scene) : new SpacePainter(scene), floor];
 }
 
-/** Returns whether a camera of one scene fits another. */
+/** Returns whether a camera of one scene fits another: places mean the same in both. */
 function hasSameExtent(a: Scene, b: Scene): boolean {
-  const measure = ({ world, floor }: Scene): string =>
-    JSON.stringify([world, floor?.width, floor?.height, floor?.box_m, floor?.origin_m]);
+  const measure = ({ world, floor, traffic }: Scene): string =>
+    JSON.stringify([world, floor?.width, floor?.height, floor?.box_m, floor?.origin_m, traffic?.chart]);
   return measure(a) === measure(b);
 }
 
@@ -350,7 +364,7 @@ export class Viewport {
 
   /** Shows what another viewport of the same world shows, so that the two can be compared. */
   takeCamera(other: Viewport): void {
-    if (other.#scene.world !== this.#scene.world || !this.camera.take(other.camera)) return;
+    if (!hasSameExtent(other.#scene, this.#scene) || !this.camera.take(other.camera)) return;
     this.#isFitted = true;
     this.#isWhole = false;
     this.requestDraw();
@@ -419,6 +433,9 @@ export class Viewport {
     pen.drawImage(this.#overlay.canvas, 0, 0, canvas.width, canvas.height);
     pen.scale(ratio, ratio);
     drawLegend(pen, this.#roles, this.#size[0], this.#palette);
+    const [width_px, height_px] = this.#size;
+    const place = { width_px, height_px: height_px - this.#profile_px, palette: this.#palette };
+    drawColorLegend(pen, this.#colors?.legend ?? null, place);
     return canvas;
   }
 
@@ -451,7 +468,9 @@ export class Viewport {
     if (this.#frame) this.#drawBodies(this.#frame);
     if (this.#marksChanged) this.#drawMarks();
     if (this.#viewChanged) {
-      this.#painter.scale(pxPerM, this.#palette, this.#size[1], this.#size[0]);
+      const [width_px, height_px] = this.#size;
+      const ratio = this.#renderer.getPixelRatio();
+      this.#painter.scale({ pxPerM, palette: this.#palette, width_px, height_px, ratio });
       for (const strokes of [this.#grid, this.#trailStrokes, this.#marks]) strokes.scale(pxPerM, ...this.#size);
       if (this.#plan) this.#plan.drawGrid(this.#grid, this.#planState(this.#plan));
       else if (!this.#floor) drawGrid(this.#grid, this.camera, this.#extent, this.#size, this.#palette);
@@ -472,7 +491,7 @@ export class Viewport {
     const isChanged = colors.update(frame, { camera, size_px, options: this.#options, palette: this.#palette });
     if (this.#floor) this.#floor.walls.visible = colors.isDense;
     if (isChanged || this.#bodiesChanged) {
-      this.#painter.setColors?.(colors.tints, colors.isDense);
+      this.#painter.setColors?.(colors.tints, colors.isDense, this.#options.colors === "state");
       this.#painter.frame(frame);
     }
     const key = JSON.stringify([colors.legend, this.#palette.isDark]);

@@ -4,7 +4,8 @@ import { expect, test } from "vitest";
 import type { Frame } from "../../src/decode";
 import type { BodyTable } from "../../src/protocol";
 import { Coloring } from "../../src/scene/coloring";
-import { cellsOf, countIn, isCrowd } from "../../src/scene/density";
+import { legendLines } from "../../src/scene/color-legend";
+import { cellsOf, countIn, doSymbolsCrowd, isCrowd } from "../../src/scene/density";
 import { PlaneCamera } from "../../src/scene/camera";
 import { Motion } from "../../src/scene/motion";
 import { packColor, paletteOf, type Rgb } from "../../src/scene/palette";
@@ -34,9 +35,10 @@ function bodies(): Bodies {
   ]);
 }
 
-function frame(cycle: number, positions_m: number[], conditions: number[] = [0, 0, 0, 0, 0]): Frame {
+function frame(cycle: number, positions_m: number[], conditions: number[] = [0, 0, 0, 0, 0], dimensions = 2): Frame {
   return {
     cycle,
+    dimensions,
     positions_m: Float32Array.from(positions_m),
     conditions: Uint8Array.from(conditions),
   } as unknown as Frame;
@@ -165,6 +167,51 @@ test("agents are counted in the cells where they are, and values summed up", () 
   const { counts, sums } = countIn(cells, at, bodies().agents, Float32Array.from([1, 3, 7, 9, 9]));
   expect([counts[0], sums[0], counts[199], sums[199]]).toEqual([2, 4, 1, 7]);
   expect(counts.reduce((sum, count) => sum + count, 0)).toBe(3);
+});
+
+test("agents in space are counted where they are seen from above", () => {
+  const camera = new PlaneCamera();
+  camera.resize(200, 100);
+  camera.mPerPx = 0.1;
+  camera.center([10, 5, 0]);
+  const at = frame(0, [0.5, 0.5, 900, 0.9, 0.1, 800, 19.5, 9.5, 7, -5, 2, 6], [0, 0, 0, 0], 3);
+  const { counts } = countIn(cellsOf(camera, [200, 100]), at, bodies().agents, null);
+  expect([counts[0], counts[199]]).toEqual([2, 1]);
+});
+
+test("symbols crowd where they would cover the view, not because bodies are small there", () => {
+  const camera = new PlaneCamera();
+  camera.resize(1000, 500);
+  camera.center([0, 0, 0]);
+  const agents = Uint32Array.from({ length: 4000 }, (_, i) => i);
+  const at = frame(0, [...agents].flatMap((i) => [i % 80, Math.floor(i / 80), 9000]), [], 3); // prettier-ignore
+  const crowds = (mPerPx: number, symbol_px: number): boolean => {
+    camera.mPerPx = mPerPx;
+    camera.resize(1000, 500);
+    return doSymbolsCrowd(at, agents, camera, [1000, 500], symbol_px);
+  };
+  expect([crowds(1, 13), crowds(1, 4), crowds(0.02, 13)]).toEqual([true, false, false]);
+  expect(doSymbolsCrowd(at, agents.subarray(0, 1000), camera, [1000, 500], 40)).toBe(false);
+});
+
+test("in a video, which seeks from frame to frame, speeds are known", () => {
+  const motion = new Motion(1, 2);
+  for (let cycle = 0; cycle <= 60; cycle += 15) motion.push(cycle, Float32Array.from([2 * cycle, 0]), true);
+  expect(motion.speeds(1)[0]).toBeCloseTo(2, 6);
+});
+
+test("the legend of an image lists what that of the page does", () => {
+  const entries = Array.from({ length: 10 }, (_, i) => ({ name: `g${i}`, color: [i, 0, 0] as Rgb, count: i }));
+  const words = legendLines({ kind: "categories", title: "Group", entries }, light).map((line) => line.words);
+  expect(words).toEqual([
+    "Group",
+    ...entries.slice(0, 8).map(({ name }) => name),
+    "and 2 more, in the same colors again",
+  ]);
+  const scale = { kind: "scale", title: "Speed", unit: "m/s", ends: [0, 4], note: "mean", hasNone: true } as const;
+  const lines = legendLines(scale, light);
+  expect(lines.map((line) => line.words)).toEqual(["Speed, m/s", "", "0", "mean", "no value"]);
+  expect([lines[2]!.count, lines.map((line) => line.isBar)]).toEqual(["4", [false, true, false, false, false]]);
 });
 
 test("few agents, and agents that can be seen, are no crowd", () => {
