@@ -70,7 +70,7 @@ for (const width of [1280, 400]) {
     await page.getByRole("button", { name: "Export…" }).click();
     const plain = (await save("Image (PNG)")).bytes;
     await page.keyboard.press("Escape");
-    await page.locator(".agents").getByRole("option").nth(2).click();
+    await page.locator(".agents .row:not(.group)").nth(2).click();
     await page.locator(".legend").waitFor({ state: "attached" });
     const colors = await legendColors();
     expect(colors.length).toBeGreaterThan(1);
