@@ -73,7 +73,7 @@ export function drawColorLegend(pen: Pen, legend: ColorLegend | null, place: Leg
   const { palette } = place;
   const lines = legendLines(legend, palette);
   const widths = lines.map((line) => widthOf(pen, line));
-  const width = Math.max(MIN_WIDTH_PX, ...widths) + 2 * PADDING_PX;
+  const width = Math.max(MIN_WIDTH_PX, Math.max(...widths) + 2 * PADDING_PX);
   const height = lines.length * LINE_PX + PADDING_PX;
   const left = place.width_px - RIGHT_PX - width;
   const top = place.height_px - BOTTOM_PX - height;

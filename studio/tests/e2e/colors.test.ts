@@ -2,7 +2,7 @@
 
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
-import { drawn, launch, openNew, openPage, WAIT_MS, type PageOptions } from "../browser";
+import { launch, openNew, openPage, WAIT_MS, type PageOptions } from "../browser";
 import { FakeServer } from "../fake/server";
 import { countColors, type Color } from "../pixels";
 
@@ -100,9 +100,15 @@ describe("a crowd", () => {
       await legend().getByText("Density").waitFor();
       await legend().getByText("robots in a cell").waitFor();
       await settle();
+      // Words are as dark as walls.
+      const words = page.locator("canvas.words, section.colors");
+      const show = (visibility: string) =>
+        words.evaluateAll((all, to) => all.forEach((one) => ((one as HTMLElement).style.visibility = to)), visibility);
+      await show("hidden");
       const [walls, , alarms] = await countColors(page, picture(), [WALL, COURIERS, [208, 16, 16]], 30);
       expect(walls).toBeGreaterThan(1000);
       expect(alarms).toBe(0);
+      await show("visible");
       await page.getByRole("button", { name: "More", exact: true }).click();
       await page.getByLabel("Density").selectOption("off");
       await legend().waitFor({ state: "detached" });
@@ -174,7 +180,9 @@ describe("side by side", () => {
     await page.getByLabel("Transport").getByRole("button", { name: "First difference" }).waitFor();
     const views = page.locator(".view");
     const pictures = async (k: number): Promise<Buffer> => views.nth(k).locator("canvas.words").screenshot();
-    await drawn(page);
+    await page.waitForFunction(() =>
+      [...document.querySelectorAll<HTMLElement>(".view")].every((view) => Number(view.dataset.pictures ?? 0) > 1),
+    );
     const [first, second] = [await pictures(0), await pictures(1)];
     const box = (await views.nth(0).boundingBox())!;
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);

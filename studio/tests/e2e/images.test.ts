@@ -3,9 +3,9 @@
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, expect, test } from "vitest";
-import { drawn, launch, openNew, openPage } from "../browser";
+import { drawn, launch, openNew, openPage, WAIT_MS } from "../browser";
 import { FakeServer } from "../fake/server";
-import { readImage, type Color } from "../pixels";
+import { countColors, readImage, type Color } from "../pixels";
 import { framesOf, meanDifference, picturesOf } from "../webm";
 
 /** Where the legend of an image is, at twice the size. */
@@ -70,7 +70,7 @@ for (const width of [1280, 400]) {
     await page.getByRole("button", { name: "Export…" }).click();
     const plain = (await save("Image (PNG)")).bytes;
     await page.keyboard.press("Escape");
-    await page.locator(".agents .row:not(.group)").nth(2).click();
+    await page.locator(".agents").getByRole("treeitem", { name: "courier Anna" }).click();
     await page.locator(".legend").waitFor({ state: "attached" });
     const colors = await legendColors();
     expect(colors.length).toBeGreaterThan(1);
@@ -87,6 +87,64 @@ for (const width of [1280, 400]) {
     expect(consoleErrors).toEqual([]);
   });
 }
+
+/** Number of pixels of an image near a color, within a part of it. */
+function countInImage(bytes: Buffer, color: Color, part?: { x: number; y: number; width: number; height: number }) {
+  return page.evaluate(
+    async ({ url, color: [r, g, b], part }) => {
+      const image = new Image();
+      image.src = url;
+      await image.decode();
+      const { x, y, width, height } = part ?? { x: 0, y: 0, width: image.width, height: image.height };
+      const pen = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d")!;
+      pen.drawImage(image, -x, -y);
+      const { data } = pen.getImageData(0, 0, width, height);
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4)
+        if (Math.max(Math.abs(data[i]! - r), Math.abs(data[i + 1]! - g), Math.abs(data[i + 2]! - b)) <= 6) count++;
+      return count;
+    },
+    { url: `data:image/png;base64,${bytes.toString("base64")}`, color, part },
+  );
+}
+
+const COURIERS: Color = [0, 114, 178];
+const GUARDS: Color = [213, 94, 0];
+const chooseColors = (colors: string) => page.getByLabel("Colors", { exact: true }).first().selectOption(colors);
+
+test("an image has the legend of colors where the page has it", async () => {
+  await visit("robots");
+  await chooseColors("group");
+  const legend = page.getByRole("region", { name: "Colors" });
+  await legend.getByText("couriers").waitFor();
+  const [box, view] = [(await legend.boundingBox())!, (await page.locator(".view").boundingBox())!];
+  const part = {
+    x: Math.round(2 * (box.x - view.x)),
+    y: Math.round(2 * (box.y - view.y)),
+    width: Math.round(2 * box.width),
+    height: Math.round(2 * box.height),
+  };
+  await page.getByRole("button", { name: "Export…" }).click();
+  const { bytes } = await save("Image (PNG)");
+  writeFileSync("screenshots/image-colors.png", bytes);
+  // A swatch has 11 x 11 pixels of the page.
+  for (const color of [COURIERS, GUARDS]) expect(await countInImage(bytes, color, part)).toBeGreaterThan(400);
+});
+
+test("robots of a crowd are as large in an image as on the page", { timeout: 4 * WAIT_MS }, async () => {
+  await visit("crowd");
+  await page.getByRole("button", { name: "More", exact: true }).click();
+  await page.getByLabel("Density").selectOption("off");
+  await page.keyboard.press("Escape");
+  await chooseColors("group");
+  await page.getByRole("region", { name: "Colors" }).getByText("3334").waitFor();
+  await page.evaluate(() => new Promise((then) => requestAnimationFrame(() => requestAnimationFrame(then))));
+  const [onPage] = await countColors(page, page.locator(".view"), [COURIERS]);
+  await page.getByRole("button", { name: "Export…" }).click();
+  const inImage = await countInImage((await save("Image (PNG)")).bytes, COURIERS);
+  // Twice the size each way.
+  expect(inImage / onPage!).toBeGreaterThan(3);
+});
 
 test("a video of a run that goes on has each of its frames, and shows their cycles", async () => {
   await visit("robots");
