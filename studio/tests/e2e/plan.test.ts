@@ -93,8 +93,8 @@ test("the zone of the selected aircraft is drawn, and no other one", async () =>
   const zones = () => countColors(page, view(), colors, 1);
   const [ownBefore, otherBefore] = await zones();
   await select("ONE11");
-  await expect.poll(async () => (await zones())[0], { timeout: WAIT_MS }).toBeGreaterThan(ownBefore! + 100);
-  expect((await zones())[1]).toBeLessThan(otherBefore! + 40);
+  await expect.poll(async () => (await zones())[0], { timeout: WAIT_MS }).toBeGreaterThan(ownBefore! + 40);
+  expect((await zones())[1]).toBeLessThan(otherBefore! + 20);
 });
 
 test("all trails are there after a seek, are asked for once, and go on while it plays", async () => {
