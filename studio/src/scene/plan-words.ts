@@ -225,13 +225,16 @@ export class PlanWords {
     const { camera, painter, size_px, profile_px, selected, hovered } = context;
     const rank = ({ index, isAlert }: Aircraft): number =>
       index === selected ? 0 : index === hovered ? 1 : isAlert ? 2 : 3;
-    const shown = painter.hidesAgents ? [] : painter.aircraft();
-    const { number: numbers } = painter.bodies!.table;
+    const { bodies } = painter;
+    // Before the first frame nobody is known.
+    if (!bodies || painter.hidesAgents) return [];
+    const shown = painter.aircraft();
+    const { number: numbers } = bodies.table;
     const all = shown.sort((a, b) => rank(a) - rank(b) || a.index - b.index);
     return all.flatMap((aircraft): Block[] => {
       const [x, y] = camera.project(aircraft.x_m, aircraft.y_m);
       if (x < 0 || y < 0 || x > size_px[0] || y > size_px[1] - profile_px) return [];
-      const lines = this.#linesOf(aircraft, painter.bodies!.name(aircraft.index));
+      const lines = this.#linesOf(aircraft, bodies.name(aircraft.index));
       pen.font = BOLD;
       const first = pen.measureText(lines[0]).width;
       pen.font = FONT;
