@@ -18,8 +18,9 @@ fn px_per_unit(svg: &str, anchor: &str, coordinate: &str) -> f64 {
             Some((words.parse().ok()?, value(line, coordinate)?))
         })
         .collect();
-    let ((a, from), (b, to)) = (ticks[0], ticks[ticks.len() - 1]);
     assert!(ticks.len() > 1, "an axis has two ticks at least");
+    // The first axis is that of the plan; a profile below it has another scale.
+    let ((a, from), (b, to)) = (ticks[0], ticks[1]);
     ((to - from) / (b - a)).abs()
 }
 
