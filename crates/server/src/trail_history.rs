@@ -279,7 +279,8 @@ mod tests {
             all.iter().map(|(_, cycles)| cycles.len()).sum::<usize>() <= MAX_REPLY_PLACES + 1000
         );
         let one = &trails(&history, 3000, &[airplane(7)])[0].1;
-        assert!(one[0] == 0.0 && one.len() >= 300 && one.len() > cycles.len(), "{one:?}");
+        assert!(one.len() == MAX_REPLY_PLACES_PER_BODY && one.len() > cycles.len(), "{one:?}");
+        assert_eq!(history.samples.first_key_value().map(|(&cycle, _)| cycle), Some(0));
     }
 
     #[test]

@@ -87,9 +87,9 @@ fn decode_chunk(bytes: &[u8], d: usize) -> Vec<FrameColumns> {
     let mut at = 4;
     let mut frames = Vec::new();
     for _ in 0..word(0) {
-        let head: Vec<usize> = (0..5).map(|k| word(at + 4 * k) as usize).collect();
-        let [table, times, bodies, lines, points] = head[..] else { panic!("a head") };
-        at += 20;
+        let head: Vec<usize> = (0..6).map(|k| word(at + 4 * k) as usize).collect();
+        let [table, times, bodies, lines, points, speeds] = head[..] else { panic!("a head") };
+        at += 24;
         let line_starts: Vec<u32> = (0..=lines).map(|k| word(at + 4 * k)).collect();
         at += 4 * line_starts.len();
         let mut plane = |channels: usize| {
@@ -99,11 +99,12 @@ fn decode_chunk(bytes: &[u8], d: usize) -> Vec<FrameColumns> {
         };
         let places = plane(d * (bodies + points));
         let turns = plane(bodies * if d == 2 { 1 } else { 4 });
+        let velocities = if speeds == 0 { vec![Vec::new(); times] } else { plane(speeds) };
         let conditions = plane(bodies);
-        for ((places, turns), conditions) in places.into_iter().zip(turns).zip(conditions) {
+        let columns = places.into_iter().zip(turns).zip(velocities).zip(conditions);
+        for (((places, turns), velocities), conditions) in columns {
             let table = table as u32;
             let line_starts = line_starts.clone();
-            let velocities = Vec::new();
             frames.push(FrameColumns { table, places, turns, velocities, line_starts, conditions });
         }
     }
@@ -129,6 +130,11 @@ fn frames_are_those_that_a_server_sends() {
                 a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most)
             };
             assert!(is_near(&sent.places, &kept.places, tolerance), "cycle {}", run.cycle());
+            assert!(
+                is_near(&sent.velocities, &kept.velocities, tolerance),
+                "cycle {}",
+                run.cycle()
+            );
             assert!(
                 is_near(&sent.turns, &kept.turns, 4e-6_f32.min(tolerance)),
                 "cycle {}",
