@@ -21,10 +21,10 @@ from . import _native
 POLL_INTERVAL_S = 0.5
 
 
-def run_task(build: str, scenarios: list[Any], trials: list[Any]) -> list[str]:
+def run_task(build: str, scenarios: list[Any], trials: list[Any], series: list[str] | None = None) -> list[str]:
     """Runs some trials of a sweep, and returns their outcomes as JSON; a worker that does it ends with its driver."""
     end_with_driver()
-    return _native.run_task(build, scenarios, trials)
+    return _native.run_task(build, scenarios, trials, series)
 
 
 class _Watch:

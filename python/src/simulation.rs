@@ -594,14 +594,14 @@ impl Simulation {
     /// (200, 320, 3)
     #[pyo3(signature = (width=640, *, size=None, agents=Vec::new(), view=None))]
     fn render<'py>(
-        &self,
-        py: Python<'py>,
+        slf: PyRef<'py, Self>,
         width: u32,
         size: Option<[u32; 2]>,
         agents: Vec<u32>,
         view: Option<&str>,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        let (still, (width, height)) = self.draw(py, parse_look(width, size, agents, view)?)?;
+        let py = slf.py();
+        let (still, (width, height)) = slf.draw(py, parse_look(width, size, agents, view)?)?;
         let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
         let pixels: Vec<u8> = opaque.copied().collect();
         PyArray1::from_vec(py, pixels).reshape([height as usize, width as usize, 3])
@@ -613,14 +613,13 @@ impl Simulation {
     /// True
     #[pyo3(signature = (width=640, *, size=None, agents=Vec::new(), view=None))]
     fn picture<'py>(
-        &self,
-        py: Python<'py>,
+        slf: PyRef<'py, Self>,
         width: u32,
         size: Option<[u32; 2]>,
         agents: Vec<u32>,
         view: Option<&str>,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        self.render(py, width, size, agents, view)
+        Self::render(slf, width, size, agents, view)
     }
 
     /// Returns the present frame as a table, one row for each body: kind, place, orientation, velocity and condition.

@@ -81,8 +81,12 @@ impl AnimationRenderer {
         let usual = || if is_plan { Camera::ABOVE } else { usual_camera(&scenery, frames) };
         let camera = look.view.camera().unwrap_or_else(usual);
         let altitudes_m = animation_altitudes_m(&scenery, box_m);
-        let below_px =
-            if is_plan { PlanAnimation::profile_room_px(look.size, altitudes_m) } else { 0.0 };
+        let below_px = match look.size {
+            AnimationSize::Exact([_, height]) if is_plan => {
+                PlanAnimation::profile_room_px(height, altitudes_m)
+            }
+            _ => 0.0,
+        };
         let (canvas, window) = canvas(camera, box_m, look.size, below_px);
         let canvas = Canvas { is_plane: scenery.dimensions == 2 || is_plan, ..canvas };
         let plan = is_plan.then(|| PlanAnimation::new(frames, canvas, window, altitudes_m));

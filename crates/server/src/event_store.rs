@@ -2,7 +2,7 @@
 
 use crate::encode::event;
 use crate::protocol::{ReplyBody, RunEvent};
-use crate::usage::StoreBytes;
+use crate::usage_registry::StoreBytes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{Frame, LogEvent};
 use std::ops::Range;

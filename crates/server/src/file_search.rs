@@ -1,7 +1,7 @@
 //! What a file is that a person names, drops or looks for.
 
 use crate::encode::problem;
-use crate::files::{AllowedFiles, file_entry, folder_paths, kind_of_folder};
+use crate::files::{AllowedFiles, FileMatches, file_entry, folder_paths, kind_of_folder};
 use crate::protocol::{FileEntry, FileKind, Problem};
 use sidestep_scenario::{ImportOptions, Source, Worlds};
 use std::collections::VecDeque;
@@ -15,13 +15,6 @@ const MAX_EXAMINED: usize = 5000;
 /// Maximum depth of folders in folders that are looked into.
 const MAX_DEPTH: usize = 6;
 
-/// Entries, and the number of those that are not among them.
-#[derive(Debug, PartialEq)]
-pub(crate) struct FoundFiles {
-    pub(crate) entries: Vec<FileEntry>,
-    pub(crate) left_out: u64,
-}
-
 /// A file or a folder on the way through the folders given at start.
 struct WalkedPath {
     path: PathBuf,
@@ -32,7 +25,7 @@ struct WalkedPath {
 impl AllowedFiles {
     /// Returns everything below the folders given at start that can be opened or named, and whose path or description
     /// contains a text.
-    pub(crate) fn find(&self, text: &str, worlds: &Worlds) -> FoundFiles {
+    pub(crate) fn find(&self, text: &str, worlds: &Worlds) -> FileMatches {
         let wanted = text.trim().to_lowercase();
         let (walked, mut left_out) = self.walk();
         let mut foreign = 0;
@@ -52,7 +45,7 @@ impl AllowedFiles {
             entries.push(FileEntry { name, ..entry });
         }
         entries.sort_by(|a, b| a.path.cmp(&b.path));
-        FoundFiles { entries, left_out }
+        FileMatches { entries, left_out }
     }
 
     /// Returns the files and folders below those given at start, breadth first, and the number of those that are not

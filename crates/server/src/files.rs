@@ -1,8 +1,7 @@
 //! Files that a page may read: those below the folders given at start, after links are resolved.
 
-use crate::drops::DropFolder;
+use crate::drop_folder::DropFolder;
 use crate::encode::problem;
-use crate::file_search::FoundFiles;
 use crate::protocol::{FileEntry, FileKind, Problem};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -48,6 +47,13 @@ struct TomlHeader {
     name: Option<String>,
     scenario: Option<IgnoredAny>,
     profile: Option<String>,
+}
+
+/// Entries, and the number of those that are not among them.
+#[derive(Debug, PartialEq)]
+pub(crate) struct FileMatches {
+    pub(crate) entries: Vec<FileEntry>,
+    pub(crate) left_out: u64,
 }
 
 impl AllowedFiles {
@@ -160,11 +166,11 @@ impl AllowedFiles {
         &self,
         folder: Option<&str>,
         worlds: &Worlds,
-    ) -> Result<FoundFiles, Problem> {
+    ) -> Result<FileMatches, Problem> {
         let Some(folder) = folder else {
             let roots = self.roots.iter();
             let entries = roots.filter_map(|root| file_entry(&root.path, worlds, &mut 0)).collect();
-            return Ok(FoundFiles { entries, left_out: 0 });
+            return Ok(FileMatches { entries, left_out: 0 });
         };
         let path = self.resolve(folder)?;
         let mut paths = folder_paths(&path).map_err(|e| {
@@ -181,7 +187,7 @@ impl AllowedFiles {
             }
         }
         entries.sort_by_key(|entry| (entry.kind != FileKind::Folder, entry.name.clone()));
-        Ok(FoundFiles { entries, left_out })
+        Ok(FileMatches { entries, left_out })
     }
 }
 

@@ -2,15 +2,8 @@
 //! file.
 
 use crate::protocol::{GalleryEntry, Problem, ReplyBody};
-use crate::results::QueryFields;
-use crate::state::AppState;
-use axum::extract::State;
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
-use axum::http::{HeaderMap, StatusCode, Uri};
-use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use sidestep_scenario::{Source, Worlds};
-use std::sync::Arc;
 
 /// A scenario that the program carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,25 +63,6 @@ pub(crate) fn find_shipped(
 pub(crate) fn gallery_reply(gallery: &[ShippedScenario], worlds: &Worlds) -> ReplyBody {
     let entries = gallery.iter().filter_map(|shipped| shipped.entry(worlds));
     ReplyBody::Gallery { entries: entries.collect() }
-}
-
-/// Returns the picture of a scenario: `/picture?name=robots/office`.
-pub(crate) async fn answer(
-    State(state): State<Arc<AppState>>,
-    headers: HeaderMap,
-    uri: Uri,
-) -> Response {
-    if let Err(refusal) = state.access.authorize_fetch(&headers) {
-        return refusal.into_response();
-    }
-    let fields = QueryFields::from_query(uri.query());
-    let name = fields.get("name").unwrap_or_default();
-    let Ok(shipped) = find_shipped(state.deps.gallery, name) else {
-        return (StatusCode::NOT_FOUND, "There is no such picture.\n").into_response();
-    };
-    // Another build may have another picture at the same address.
-    let about = [(CONTENT_TYPE, "image/png"), (CACHE_CONTROL, "private, max-age=3600")];
-    (about, shipped.picture_png).into_response()
 }
 
 /// Returns the first sentence of the comment at the head of a scenario.

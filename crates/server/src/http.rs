@@ -3,7 +3,7 @@
 use crate::access::AccessError;
 use crate::request::MAX_REQUEST_BYTES;
 use crate::state::AppState;
-use crate::{drops, gallery, page, results, socket, usage};
+use crate::{drops, gallery_picture, page, results, socket, usage};
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{DefaultBodyLimit, Request, State};
@@ -43,7 +43,7 @@ pub(crate) fn routes(state: Arc<AppState>) -> Router {
         .route("/enter", get(access_status).post(sign_in).layer(from_fn(with_body_timeout)))
         .route("/report", get(results::report))
         .route("/export", get(results::export))
-        .route("/picture", get(gallery::answer))
+        .route("/picture", get(gallery_picture::answer))
         .route("/drop", post(drops::answer))
         .route("/usage", get(usage::answer))
         .fallback(get(file))

@@ -4,7 +4,7 @@
 //! and a seek should take about as long everywhere. When the memory is full every second one is dropped, and the next
 //! ones are twice as far apart.
 
-use crate::usage::StoreBytes;
+use crate::usage_registry::StoreBytes;
 use sidestep_kernel::Cycle;
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -21,6 +21,7 @@
 mod access;
 mod agent_metrics;
 mod compress;
+mod drop_folder;
 mod drops;
 mod encode;
 mod event_search;
@@ -30,6 +31,7 @@ mod file_search;
 mod files;
 mod fleet_feed;
 mod gallery;
+mod gallery_picture;
 mod http;
 mod keyframes;
 mod limits;
@@ -48,6 +50,7 @@ mod state;
 pub mod sweep_gallery;
 mod trail_history;
 mod usage;
+mod usage_registry;
 mod write;
 
 pub use encode::FrameEncoder;
@@ -73,7 +76,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::watch;
-use usage::UsageRegistry;
+use usage_registry::UsageRegistry;
 
 /// Maximum number of frames of a session in a second: what the eye takes for motion.
 pub const MAX_FRAMES_PER_S: u32 = 30;

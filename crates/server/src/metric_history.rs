@@ -5,7 +5,7 @@
 //! the played run or the one ahead of it, has computed all cycles before.
 
 use crate::protocol::{MetricName, MetricRow, ReplyBody};
-use crate::usage::StoreBytes;
+use crate::usage_registry::StoreBytes;
 use sidestep_kernel::series::{SeriesInterval, SeriesRows};
 use sidestep_kernel::{Cycle, Simulation};
 use sidestep_scenario::{MetricInfo, MetricLabel, WorldType, metric_label};

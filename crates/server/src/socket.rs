@@ -1,7 +1,7 @@
 //! The socket of one page: requests go to sessions, and their messages to the page.
 
 use crate::encode::problem;
-use crate::file_search::FoundFiles;
+use crate::files::FileMatches;
 use crate::files::names_files;
 use crate::gallery::gallery_reply;
 use crate::outbox::{Outbox, OutboxItem};
@@ -322,7 +322,7 @@ impl SocketSessions {
     }
 }
 
-fn files_reply(FoundFiles { entries, left_out }: FoundFiles) -> ReplyBody {
+fn files_reply(FileMatches { entries, left_out }: FileMatches) -> ReplyBody {
     ReplyBody::Files { entries, left_out }
 }
 

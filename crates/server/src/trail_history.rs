@@ -2,7 +2,7 @@
 
 use crate::encode::body_id;
 use crate::protocol::{self, BodyTrail, ReplyBody};
-use crate::usage::StoreBytes;
+use crate::usage_registry::StoreBytes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{BodyId, Frame};
 use std::collections::BTreeMap;

@@ -181,7 +181,9 @@ impl<'a> Scene<'a> {
     ) -> Self {
         let mut trails = trails::drawn_trails(scenery, frame, trails, choice);
         let mut palette = Palette::new(scenery);
-        palette.color_trails(&mut trails);
+        for trail in &mut trails {
+            trail.color = palette.trail_color(trail.of);
+        }
         let surroundings = match scenery.dimensions {
             2 => Surroundings::default(),
             _ => Surroundings::new(scenery, frame),

@@ -1,6 +1,5 @@
 //! The colors of agents: by number, or by group where a scenario has several.
 
-use super::trails::DrawnTrail;
 use sidestep_kernel::view::{AgentGroup, Body, BodyId, BodyRole, Color, Scenery, body_color};
 
 /// Shades of a group's color for agents with a trail, as parts of black (below zero) or of white that are mixed in: as
@@ -24,17 +23,15 @@ impl<'a> Palette<'a> {
         Self { groups: groups(scenery), shades: Vec::new() }
     }
 
-    /// Gives each trail the color of its agent, and agents of a group with trails shades of its color.
-    pub(super) fn color_trails(&mut self, trails: &mut [DrawnTrail<'_>]) {
-        let mut counts = vec![0; self.groups.len()];
-        for trail in trails {
-            trail.color = self.plain_color(trail.of);
-            if let Some(group) = self.group_index(trail.of) {
-                trail.color = shade(trail.color, SHADES[counts[group] % MAX_SHADES]);
-                counts[group] += 1;
-                self.shades.push((trail.of, trail.color));
-            }
-        }
+    /// Returns the color of the trail of an agent; those of a group get shades of its color, one after the other.
+    pub(super) fn trail_color(&mut self, of: BodyId) -> Color {
+        let plain = self.plain_color(of);
+        let Some(group) = self.group_index(of) else { return plain };
+        let is_of_group = |(body, _): &&(BodyId, Color)| self.group_index(*body) == Some(group);
+        let earlier = self.shades.iter().filter(is_of_group).count();
+        let color = shade(plain, SHADES[earlier % MAX_SHADES]);
+        self.shades.push((of, color));
+        color
     }
 
     /// Returns whether agents have the colors of their groups.

@@ -2,7 +2,7 @@
 
 use super::HttpError;
 use crate::protocol::Problem;
-use crate::usage::StoreBytes;
+use crate::usage_registry::StoreBytes;
 use axum::http::StatusCode;
 use sidestep_kernel::Interrupt;
 use sidestep_report::RenderedReport;

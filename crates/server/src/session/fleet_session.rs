@@ -12,7 +12,7 @@ use crate::protocol::{
     SessionStatus, Speed,
 };
 use crate::trail_history::TrailHistory;
-use crate::usage::{SessionBytes, UsageEntry};
+use crate::usage_registry::{SessionBytes, UsageEntry};
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::Frame;
 use sidestep_session::fleet::FleetScene;

@@ -6,7 +6,7 @@ use crate::keyframes::Keyframes;
 use crate::metric_history::MetricHistory;
 use crate::protocol::Problem;
 use crate::trail_history::TrailHistory;
-use crate::usage::SessionBytes;
+use crate::usage_registry::SessionBytes;
 use sidestep_kernel::view::FrameOptions;
 use sidestep_kernel::{Cycle, Simulation};
 use std::time::{Duration, Instant};

@@ -11,7 +11,7 @@ use crate::gallery::{ShippedScenario, find_shipped};
 use crate::keyframes::MemoryBudget;
 use crate::metric_history::MetricWords;
 use crate::protocol::{Problem, ReplyBody};
-use crate::usage::UsageRegistry;
+use crate::usage_registry::UsageRegistry;
 use sidestep_kernel::shell::shell_quote;
 use sidestep_kernel::view::Kinds;
 use sidestep_kernel::{Cycle, Simulation};

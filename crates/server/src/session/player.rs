@@ -20,7 +20,7 @@ use crate::protocol::{
     BodyId, Problem, Reply, ReplyBody, ReplyResult, RunMethod, ServerNotification, SessionId,
     SessionState, SessionStatus, Speed,
 };
-use crate::usage::UsageEntry;
+use crate::usage_registry::UsageEntry;
 use seek::Seek;
 use sidestep_kernel::view::Scenery;
 use sidestep_kernel::{Cycle, Interrupt};

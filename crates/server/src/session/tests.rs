@@ -5,7 +5,7 @@ use crate::files::AllowedFiles;
 use crate::keyframes::MemoryBudget;
 use crate::outbox::OutboxItem;
 use crate::protocol::{BodyId, RunMethod, Speed};
-use crate::usage::UsageRegistry;
+use crate::usage_registry::UsageRegistry;
 use serde_json::{Value, json};
 use sidestep::worlds::WORLDS;
 use std::time::Instant;

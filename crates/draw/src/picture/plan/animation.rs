@@ -7,7 +7,6 @@ use super::profile::ProfileWindow;
 use super::sheet::{PROFILE_HEIGHT_PX, draw_lines, draw_north_arrow};
 use super::units::Units;
 use super::{Plan, Scene};
-use crate::animation::AnimationSize;
 use crate::picture::canvas::Canvas;
 use crate::style::{GRID, Style};
 use crate::svg::{Rect, Svg};
@@ -51,17 +50,16 @@ impl PlanAnimation {
         animation
     }
 
-    /// Returns the room below the plan that a profile takes at most in a picture of an exact size; elsewhere the picture
-    /// grows by what it takes.
-    pub(crate) fn profile_room_px(size: AnimationSize, altitudes_m: [f64; 2]) -> f64 {
-        let AnimationSize::Exact([_, height]) = size else { return 0.0 };
+    /// Returns the room below the plan that a profile takes at most in a picture of this height; where the height is
+    /// free, the picture grows by what it takes.
+    pub(crate) fn profile_room_px(height_px: u32, altitudes_m: [f64; 2]) -> f64 {
         if altitudes_m[0] >= altitudes_m[1] {
             return 0.0;
         }
         let part = PROFILE_FRACTION / (1.0 + PROFILE_FRACTION);
         let [least_px, most_px] = PROFILE_HEIGHT_PX;
         // Its height is rounded to an even number.
-        (part * f64::from(height)).clamp(least_px, most_px) + GAP_PX + 1.0
+        (part * f64::from(height_px)).clamp(least_px, most_px) + GAP_PX + 1.0
     }
 
     fn add_profile(&mut self, altitudes_m: [f64; 2]) {

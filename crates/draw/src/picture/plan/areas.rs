@@ -1,10 +1,9 @@
-//! Areas in a plan: filled and hatched, with their limits in words; and as bands in a profile.
+//! Areas in a plan: filled and hatched, with their limits in words.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::Plan;
-use super::profile::ProfileWindow;
 use crate::picture::Scene;
 use crate::picture::canvas::Px;
 use crate::picture::map_legend::display_name;
@@ -15,7 +14,7 @@ use sidestep_kernel::view::{AreaLevels, Body, Shape, TrafficPlan, Vec3};
 /// Color of areas: none of the colors of aircraft, and not that of conflicts.
 pub(super) const AREA_COLOR: &str = "#6A5ACD";
 /// Attributes of the lines around areas, of those to stay out of and of those to stay inside of.
-const BORDERS: [&str; 2] = [
+pub(super) const BORDERS: [&str; 2] = [
     r##"stroke="#6A5ACD" stroke-width="1.3""##,
     r##"stroke="#6A5ACD" stroke-width="1.6" stroke-dasharray="8 4""##,
 ];
@@ -144,7 +143,8 @@ fn clamp_inside(place: f64, low: f64, high: f64) -> f64 {
     place.clamp(low, high.max(low))
 }
 
-fn bounds_px(plan: &Plan<'_>, area: &DrawnArea<'_>) -> [Px; 2] {
+/// Returns the least and the largest pixel of an area.
+pub(super) fn bounds_px(plan: &Plan<'_>, area: &DrawnArea<'_>) -> [Px; 2] {
     let mut low = (f64::INFINITY, f64::INFINITY);
     let mut high = (f64::NEG_INFINITY, f64::NEG_INFINITY);
     for &at_m in area.rings_m.iter().copied().flatten() {
@@ -153,30 +153,4 @@ fn bounds_px(plan: &Plan<'_>, area: &DrawnArea<'_>) -> [Px; 2] {
         high = (high.0.max(x), high.1.max(y));
     }
     [low, high]
-}
-
-/// Draws the areas of a profile, as bands between their limits over their extent east.
-pub(super) fn draw_bands(
-    svg: &mut Svg,
-    plan: &Plan<'_>,
-    profile: &ProfileWindow,
-    areas: &[DrawnArea<'_>],
-) {
-    let frame = profile.area;
-    for area in areas {
-        let [(left, _), (right, _)] = bounds_px(plan, area);
-        let top = area.levels.high_m.map_or(frame.y, |high_m| profile.y_px(high_m).max(frame.y));
-        let bottom = area
-            .levels
-            .low_m
-            .map_or(frame.bottom(), |low_m| profile.y_px(low_m).min(frame.bottom()));
-        let band = Rect { x: left, y: top, width: right - left, height: (bottom - top).max(0.0) };
-        let border = BORDERS[usize::from(area.levels.is_fence)];
-        let fill = if area.levels.is_fence {
-            r#"fill="none""#.to_string()
-        } else {
-            format!(r#"fill="{AREA_COLOR}" fill-opacity="0.12""#)
-        };
-        svg.rect(band, format_args!(r#"class="area-band" {fill} {border}"#));
-    }
 }

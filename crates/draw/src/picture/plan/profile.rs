@@ -2,7 +2,7 @@
 
 use super::Plan;
 use super::aircraft::{aircraft, is_in_conflict};
-use super::areas::{DrawnArea, draw_bands};
+use super::areas::{AREA_COLOR, BORDERS, DrawnArea, bounds_px};
 use crate::picture::canvas::{Camera, Canvas, Px};
 use crate::picture::{Scene, trail_lines};
 use crate::style::{FAINT_INK, GRID, INK, hex};
@@ -163,5 +163,26 @@ impl ProfileWindow {
 
     pub(super) fn draw_frame(&self, svg: &mut Svg) {
         svg.rect(self.area, format_args!(r#"class="profile" fill="none" stroke="{INK}""#));
+    }
+}
+
+/// Draws the areas of a profile, as bands between their limits over their extent east.
+fn draw_bands(svg: &mut Svg, plan: &Plan<'_>, profile: &ProfileWindow, areas: &[DrawnArea<'_>]) {
+    let frame = profile.area;
+    for area in areas {
+        let [(left, _), (right, _)] = bounds_px(plan, area);
+        let top = area.levels.high_m.map_or(frame.y, |high_m| profile.y_px(high_m).max(frame.y));
+        let bottom = area
+            .levels
+            .low_m
+            .map_or(frame.bottom(), |low_m| profile.y_px(low_m).min(frame.bottom()));
+        let band = Rect { x: left, y: top, width: right - left, height: (bottom - top).max(0.0) };
+        let border = BORDERS[usize::from(area.levels.is_fence)];
+        let fill = if area.levels.is_fence {
+            r#"fill="none""#.to_string()
+        } else {
+            format!(r#"fill="{AREA_COLOR}" fill-opacity="0.12""#)
+        };
+        svg.rect(band, format_args!(r#"class="area-band" {fill} {border}"#));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::protocol::StoreUsage;
-use crate::usage::UsageRegistry;
+use crate::usage_registry::UsageRegistry;
 use std::sync::mpsc::RecvTimeoutError::Disconnected;
 
 /// Cycles of a run with so much of everything that its stores are full: at 5 cycles a second, twelve hours of play.
