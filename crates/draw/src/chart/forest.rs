@@ -159,7 +159,7 @@ impl ForestChart {
     }
 
     /// Returns the text beside the effects, broken to fit; none where a word alone is too long.
-    fn beside(&self, style: &Style) -> BesideText {
+    fn beside(&self, style: &Style) -> EffectText {
         let size = style.small_px();
         let width = |text: &str| text::width(text, size, Weight::Regular);
         // Names that are longer are broken.
@@ -179,11 +179,11 @@ impl ForestChart {
         let all = lines.iter().flatten().flatten();
         // A line that was cut off would be a wrong number.
         if all.clone().any(|line| line.contains('\u{2026}')) {
-            return BesideText::default();
+            return EffectText::default();
         }
         let widest = all.map(|line| width(line)).fold(0.0, f64::max);
         let width_px = if widest > 0.0 { widest + TEXT_GAP_PX } else { 0.0 };
-        BesideText { lines, width_px }
+        EffectText { lines, width_px }
     }
 
     /// A single series needs no legend.
@@ -204,7 +204,7 @@ impl ForestChart {
         frame: &mut ChartFrame,
         x: Scale,
         index: usize,
-        (style, beside): (&Style, &BesideText),
+        (style, beside): (&Style, &EffectText),
     ) {
         let size = style.small_px();
         let effect_px = lines_of_effect(beside.max_lines()) * LINE * size;
@@ -232,13 +232,13 @@ impl ForestChart {
 
 /// The text beside the effects.
 #[derive(Debug, Default)]
-struct BesideText {
+struct EffectText {
     /// The lines of each effect, series by series and row by row; empty if they are left out.
     lines: Vec<Vec<Vec<String>>>,
     width_px: f64,
 }
 
-impl BesideText {
+impl EffectText {
     fn max_lines(&self) -> usize {
         self.lines.iter().flatten().map(Vec::len).max().unwrap_or(0)
     }

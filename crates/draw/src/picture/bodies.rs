@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::canvas::{Canvas, Px, corners};
 use super::palette::pale;
-use super::surroundings::SeenAgents;
+use super::surroundings::AgentProjections;
 use super::{AgentEmphasis, Scene};
 use crate::legend::{leader_mark, target_mark};
 use crate::style::{INK, hex};
@@ -115,7 +115,7 @@ pub(super) fn draw_by_depth(svg: &mut Svg, scene: &Scene<'_>, canvas: &Canvas) {
     parts.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
     let balls = scene.surroundings.balls();
     let are_many = balls.len() > MAX_SEPARATE_BALLS;
-    let agents = SeenAgents::new(scene.frame, canvas);
+    let agents = AgentProjections::new(scene.frame, canvas);
     svg.push_raw(format_args!(r#"<g class="parts" {LINE_ATTRIBUTES}>"#));
     for alike in parts.chunk_by(|a, b| are_many && are_like_balls(canvas, a.body, b.body)) {
         match alike {

@@ -117,12 +117,12 @@ fn gap_m(at: Vec3, [a, b]: &[Vec3; 2]) -> f64 {
 }
 
 /// The agents of a moment as they are seen, to find what hides them.
-pub(super) struct SeenAgents {
+pub(super) struct AgentProjections {
     /// Where their points are seen, and how near to the eye.
     points: Vec<(Px, f64)>,
 }
 
-impl SeenAgents {
+impl AgentProjections {
     pub(super) fn new(frame: &Frame, canvas: &Canvas) -> Self {
         let segments = agent_segments(frame);
         let seen = |at: Vec3| (canvas.px(at), canvas.camera.depth_m(at));
@@ -247,7 +247,7 @@ mod tests {
             is_plane: false,
         };
         let (_, frame) = among_balls(0);
-        let seen = SeenAgents::new(&frame, &canvas);
+        let seen = AgentProjections::new(&frame, &canvas);
         let at = |place| round(BodyKind::OBSTACLE, 0, place, 0.4);
         assert!(seen.are_behind(&at([2.0, -3.0, 0.0]), &canvas), "the eye is where y is low");
         assert!(!seen.are_behind(&at([2.0, 3.0, 0.0]), &canvas));
