@@ -5,12 +5,14 @@ import type { SweepRun } from "../protocol";
 
 /** The rule by which a run is an outlier, in words: that of reports and exports. */
 export const OUTLIER_RULE =
-  "An outlier lies more than 1.5 interquartile ranges outside the quartiles of the runs of its variant (Tukey's rule), in variants of 5 or more runs.";
+  "An outlier lies more than 1.5 interquartile ranges outside the quartiles of the runs of its variant (Tukey's rule), in variants of 5 or more runs. Where more than three quarters of the runs agree, every other value is one.";
 
 /** Least number of runs of a variant among which one can be an outlier. */
 const MIN_RUNS = 5;
 /** Distance from the quartiles in interquartile ranges beyond which a value is an outlier. */
 const FENCE_RANGES = 1.5;
+/** Relative difference of two values that may come from rounding alone. */
+const MAX_ROUNDING = 1e-9;
 
 /** A run with its outliers. */
 export interface ListedRun {
@@ -72,7 +74,9 @@ function beyondOf(value: number | null, fences: Fences | null): { side: -1 | 0 |
   const above = value - fences.third;
   const below = fences.first - value;
   const beyond = Math.max(above, below);
-  if (beyond <= 0 || beyond <= FENCE_RANGES * range) return { side: 0, distance: 0 };
+  // Where most runs agree, another one is not special by its rounding alone.
+  const rounding = MAX_ROUNDING * Math.max(Math.abs(fences.first), Math.abs(fences.third), Math.abs(value));
+  if (beyond <= rounding || beyond <= FENCE_RANGES * range) return { side: 0, distance: 0 };
   return { side: above > 0 ? 1 : -1, distance: beyond / range };
 }
 

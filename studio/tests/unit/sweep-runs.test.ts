@@ -29,6 +29,8 @@ test("few runs, rounding and missing values make no outlier", () => {
   expect(marks([third, third, third, third, third, third + 1e-16].map((v, seed) => run("a", seed, v)))).toEqual(
     Array(6).fill(0),
   );
+  const nearly = [third, third, third, third, third + 1e-16, 5];
+  expect(marks(nearly.map((v, seed) => run("a", seed, v)))).toEqual([0, 0, 0, 0, 0, 1]);
   expect(marks([1, 1, 1, 1, null, 9].map((value, seed) => run("a", seed, value)))).toEqual([0, 0, 0, 0, 0, 1]);
 });
 
