@@ -187,7 +187,7 @@ fn a_scenario_played_in_the_studio_comes_to_the_digest_of_run() {
     let studio = Studio::start(&place, &["s.toml", "--workers", "2"]);
     let mut page = studio.page();
     let hello = page.read();
-    assert_eq!((&hello["notice"], &hello["version"]), (&"hello".into(), &2.into()));
+    assert_eq!((&hello["notice"], &hello["version"]), (&"hello".into(), &3.into()));
     assert_eq!(hello["open"], json!([{ "kind": "scenario", "path": "s.toml" }]));
     let listed = page.ask(json!({ "do": "files", "folder": "." }));
     assert_eq!(listed["entries"][0]["about"], "robots: small");
