@@ -36,20 +36,20 @@ impl EventQuery<'_> {
         let mut entries: Vec<RunEvent> = Vec::new();
         let mut found = 0_u64;
         let mut counts: BTreeMap<LogEventKind, u64> = BTreeMap::new();
-        for entry in store.kept() {
+        store.kept().for_each(|entry| {
             *counts.entry(entry.kind).or_default() += 1;
             if !self.is_wanted_kind(entry.kind) || !has_words(entry, &words, &names) {
-                continue;
+                return;
             }
             found += 1;
             if found > u64::from(self.skip) && entries.len() < limit {
                 entries.push(event(entry));
             }
-        }
+        });
         ReplyBody::FoundEvents {
             entries,
             found,
-            searched: store.kept().len() as u64,
+            searched: store.kept().len(),
             left_out: store.lost_count(),
             kinds: counts.iter().map(|(kind, count)| (kind.name().to_string(), *count)).collect(),
         }

@@ -1,16 +1,15 @@
 //! The events of a session, each kept once, however often its cycle is computed.
 
 use crate::encode::event;
+use crate::event_log::EventLog;
 use crate::protocol::{ReplyBody, RunEvent};
 use crate::usage_registry::StoreBytes;
 use sidestep_kernel::Cycle;
 use sidestep_kernel::view::{Frame, LogEvent};
 use std::ops::Range;
 
-/// Maximum number of events kept: some tens of megabytes. Further ones are counted.
-const MAX_EVENTS: usize = 100_000;
-/// Maximum number of bytes of the sentences of events; that of a usual event has some dozens.
-const MAX_WORD_BYTES: usize = 16 << 20;
+/// Maximum number of events kept, so that a search takes seconds at most. Further ones are counted.
+const MAX_EVENTS: u64 = 2_000_000;
 /// Number of cycles for which events that are not kept are counted together, so that the counts stay few.
 const MIN_LOSS_BUCKET_CYCLES: Cycle = 1024;
 /// Maximum number of such counts. Where there are more, those of twice as many cycles are put together.
@@ -22,10 +21,8 @@ const MAX_FRAME_EVENTS: usize = 100;
 /// The events of one run.
 #[derive(Debug)]
 pub(crate) struct EventStore {
-    /// Events as the kernel reports them: most are never requested, so they are converted only then.
-    kept: Vec<LogEvent>,
-    /// Bytes of their sentences.
-    word_bytes: usize,
+    /// Events as the kernel reports them: they are converted when they are requested.
+    kept: EventLog,
     /// The first cycle not computed yet.
     frontier: Cycle,
     /// Numbers of events that were not kept, with the first cycle of each bucket.
@@ -39,15 +36,7 @@ pub(crate) struct EventStore {
 
 impl Default for EventStore {
     fn default() -> Self {
-        Self {
-            kept: Vec::new(),
-            word_bytes: 0,
-            frontier: 0,
-            lost: Vec::new(),
-            bucket_cycles: MIN_LOSS_BUCKET_CYCLES,
-            unsent: UnsentEvents::default(),
-            unsent_to_viewers: None,
-        }
+        Self::new(MAX_EVENTS)
     }
 }
 
@@ -69,6 +58,18 @@ impl UnsentEvents {
 }
 
 impl EventStore {
+    /// Returns a store that keeps at most so many events.
+    pub(crate) fn new(max_events: u64) -> Self {
+        Self {
+            kept: EventLog::new(max_events),
+            frontier: 0,
+            lost: Vec::new(),
+            bucket_cycles: MIN_LOSS_BUCKET_CYCLES,
+            unsent: UnsentEvents::default(),
+            unsent_to_viewers: None,
+        }
+    }
+
     /// Takes the events of a frame that is shown.
     pub(crate) fn record(&mut self, frame: &mut Frame) {
         self.unsent.push(&frame.log, frame.log_left_out);
@@ -88,28 +89,12 @@ impl EventStore {
         let known = log.partition_point(|entry| entry.cycle < self.frontier);
         let mut lost = frame.log_left_out;
         for entry in log.drain(known..) {
-            if !self.keep(entry) {
+            if !self.kept.push(entry) {
                 lost += 1;
             }
         }
         self.record_loss(frame.cycle - 1, lost);
         self.frontier = frame.cycle;
-    }
-
-    /// Keeps an event; returns whether there was room for it.
-    fn keep(&mut self, entry: LogEvent) -> bool {
-        let words = entry.words.capacity();
-        if self.kept.len() >= MAX_EVENTS || self.word_bytes + words > MAX_WORD_BYTES {
-            return false;
-        }
-        if self.kept.len() == self.kept.capacity() {
-            // Twice as many, as usual, but never beyond the bound.
-            let more = self.kept.len().max(64).min(MAX_EVENTS - self.kept.len());
-            self.kept.reserve_exact(more);
-        }
-        self.word_bytes += words;
-        self.kept.push(entry);
-        true
     }
 
     fn record_loss(&mut self, cycle: Cycle, lost: u64) {
@@ -141,13 +126,13 @@ impl EventStore {
 
     /// Returns the bytes of all that is kept.
     pub(crate) fn bytes(&self) -> StoreBytes {
-        let of_events = |count: usize| count * size_of::<LogEvent>();
-        let of_counts = |count: usize| count * size_of::<(Cycle, u64)>();
-        let used =
-            of_events(self.kept.capacity()) + self.word_bytes + of_counts(self.lost.capacity());
-        // The list of counts grows to a power of two.
-        let max = of_events(MAX_EVENTS) + MAX_WORD_BYTES + of_counts(2 * MAX_LOSS_BUCKETS);
-        StoreBytes { used: used as u64, max: max as u64 }
+        let StoreBytes { used, max } = self.kept.bytes();
+        let of_counts = |count: usize| (count * size_of::<(Cycle, u64)>()) as u64;
+        StoreBytes {
+            used: used + of_counts(self.lost.capacity()),
+            // The list of counts grows to a power of two.
+            max: max + of_counts(2 * MAX_LOSS_BUCKETS),
+        }
     }
 
     /// Returns the cycle before which all events are known.
@@ -156,7 +141,7 @@ impl EventStore {
     }
 
     /// Returns all events that are kept, by their cycles.
-    pub(crate) fn kept(&self) -> &[LogEvent] {
+    pub(crate) fn kept(&self) -> &EventLog {
         &self.kept
     }
 
@@ -190,14 +175,13 @@ impl EventStore {
 
     /// Returns at most the given number of events of some cycles, after the first `skip` ones.
     pub(crate) fn events_reply(&self, cycles: Range<Cycle>, skip: u32, limit: u32) -> ReplyBody {
-        let start = self.kept.partition_point(|entry| entry.cycle < cycles.start);
-        let end = self.kept.partition_point(|entry| entry.cycle < cycles.end).max(start);
-        let start = start.saturating_add(skip as usize).min(end);
-        let entries: Vec<RunEvent> =
-            self.kept[start..end].iter().take(limit as usize).map(event).collect();
+        let page = self.kept.page(&cycles, skip.into(), limit as usize);
         let lost = self.lost.iter().filter(|(cycle, _)| cycles.contains(cycle));
         let lost: u64 = lost.map(|(_, count)| count).sum();
-        let left_out = (end - start - entries.len()) as u64 + lost;
+        // Those before the page are not left out: whoever skips them has them.
+        let remaining = page.count.saturating_sub(skip.into()) - page.entries.len() as u64;
+        let left_out = remaining + lost;
+        let entries: Vec<RunEvent> = page.entries.iter().map(event).collect();
         ReplyBody::Events { entries, left_out, known_until: self.frontier as f64 }
     }
 }
@@ -250,20 +234,21 @@ mod tests {
 
     #[test]
     fn frames_and_memory_hold_so_many_and_the_rest_is_counted() {
-        let mut events = EventStore::default();
-        let happened: Vec<Cycle> = vec![3; MAX_EVENTS + 7];
+        const KEPT: usize = 5000;
+        let mut events = EventStore::new(KEPT as u64);
+        let happened: Vec<Cycle> = vec![3; KEPT + 7];
         events.record(&mut Frame { log_left_out: 2, ..frame(4, &happened) });
         let (shown, left_out) = events.take_unsent();
         assert_eq!(
             (shown.len(), left_out),
-            (MAX_FRAME_EVENTS, (MAX_EVENTS + 7 - MAX_FRAME_EVENTS + 2) as u64)
+            (MAX_FRAME_EVENTS, (KEPT + 7 - MAX_FRAME_EVENTS + 2) as u64)
         );
         assert_eq!(cycles(&events.events_reply(0..9, 0, u32::MAX)).1, 9);
     }
 
     #[test]
     fn long_sentences_and_endless_losses_stay_within_the_bound_and_are_counted() {
-        let mut events = EventStore::default();
+        let mut events = EventStore::new(1000);
         let mut told = 0;
         for cycle in 1..=3 * MAX_LOSS_BUCKETS as Cycle {
             let mut frame = frame(1024 * cycle, &[1024 * cycle - 1]);
@@ -275,7 +260,7 @@ mod tests {
         }
         let reply = events.events_reply(0..Cycle::MAX, 0, u32::MAX);
         let (kept, lost) = cycles(&reply);
-        assert!(kept.len() < MAX_EVENTS && lost >= 2 * MAX_LOSS_BUCKETS as u64);
+        assert!(kept.len() == 1000 && lost >= 2 * MAX_LOSS_BUCKETS as u64);
         assert_eq!(kept.len() as u64 + lost, told);
     }
 }

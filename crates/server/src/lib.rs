@@ -24,6 +24,7 @@ mod compress;
 mod drop_folder;
 mod drops;
 mod encode;
+mod event_log;
 mod event_search;
 mod event_store;
 mod file_choices;

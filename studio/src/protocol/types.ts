@@ -452,6 +452,10 @@ columns_left_out: number,
  */
 runs: Array<SweepRun>,
 /**
+ * The rule by which a run is an outlier, in words.
+ */
+outlier_rule: string,
+/**
  * Number of runs that are not listed.
  */
 left_out: number, } | { "is": "problems",
@@ -872,6 +876,10 @@ bodies: Array<StaticBody>,
  */
 groups: Array<SceneGroup>,
 /**
+ * The names of all bodies that have some, also of those that are not there yet, or gone.
+ */
+names: Array<BodyName>,
+/**
  * Whether a recorded run is computed again.
  */
 is_recording: boolean,
@@ -879,6 +887,23 @@ is_recording: boolean,
  * What a plan view shows of traffic; none where the scene is no traffic.
  */
 traffic: Traffic | null, };
+
+/**
+ * The name of a body, which all its parts share.
+ */
+export type BodyName = {
+/**
+ * Its kind.
+ */
+kind: string,
+/**
+ * Its number among the bodies of its kind.
+ */
+number: number,
+/**
+ * Its name.
+ */
+name: string, };
 
 /**
  * Agents that the scenario describes together, such as couriers.
@@ -1184,7 +1209,28 @@ replay: TargetRef,
 /**
  * Its results, column by column; null where it has none.
  */
-values: Array<number | null>, };
+values: Array<number | null>,
+/**
+ * The results that are far from those of the other runs of its variant.
+ */
+outliers: Array<SweepOutlier>, };
+
+/**
+ * A result of a run that is far from those of the other runs of its variant.
+ */
+export type SweepOutlier = {
+/**
+ * The place of its column.
+ */
+column: number,
+/**
+ * Whether it is above the others.
+ */
+is_high: boolean,
+/**
+ * Its distance from the nearer quartile in interquartile ranges; null where the quartiles are equal.
+ */
+distance_ranges: number | null, };
 
 /**
  * A result of the runs of a sweep.

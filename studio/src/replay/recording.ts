@@ -13,10 +13,11 @@ import type {
   RunEvent,
 } from "../protocol";
 import { RequestError, makeProblem } from "../connection";
+import { namesByBody } from "../state/bodies";
 import { decodeChunk, type FrameColumns } from "./chunk";
 import type { Parts } from "./parts";
 import { ByteReader, decodePlane } from "./plane";
-import { bodyNames, findEvents, type EventQuery } from "./search";
+import { findEvents, type EventQuery } from "./search";
 import { selectTable } from "./tables";
 import { TrailCollector } from "./trail-collector";
 
@@ -195,10 +196,7 @@ export class Recording {
   /** The reply to a search for events. */
   async findEvents(query: EventQuery): Promise<ReplyBody> {
     this.#events ??= this.#readEvents();
-    // The bodies of each part of the tables are those of all its tables.
-    const parts = await Promise.all(this.run.tables.map(({ part }) => this.#tables.get(part)));
-    const names = bodyNames(parts.map(({ all }) => all));
-    return findEvents(await this.#events, query, names, this.run.events_left_out);
+    return findEvents(await this.#events, query, namesByBody(this.run.scene.names), this.run.events_left_out);
   }
 
   /**

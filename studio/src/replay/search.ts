@@ -1,7 +1,7 @@
 /** Searches events for words, as the server does: see its `event_search.rs`. */
 
 import { bodyLabel } from "../format";
-import type { BodyId, BodyTable, ReplyBody, RunEvent } from "../protocol";
+import type { BodyId, ReplyBody, RunEvent } from "../protocol";
 
 /** A search for events. */
 export interface EventQuery {
@@ -9,14 +9,6 @@ export interface EventQuery {
   kinds: readonly string[] | null;
   skip: number;
   limit: number;
-}
-
-/** The names of bodies that have some, by kind and number. */
-export function bodyNames(tables: readonly BodyTable[]): Map<string, string> {
-  const names = new Map<string, string>();
-  for (const { kinds, kind, number, names: own } of tables)
-    for (const [index, name] of own) names.set(`${kinds[kind[index]!]} ${number[index]}`, name);
-  return names;
 }
 
 /** Returns the reply to a search; `leftOut` events were not kept. */

@@ -3,7 +3,7 @@
 import type { Frame } from "../decode";
 import type { Bodies } from "../state/bodies";
 import type { AgentValues, ColorMode } from "../state/color-mode";
-import { Motion, SPEED_WINDOW_CYCLES } from "./motion";
+import { Motion } from "./motion";
 import { packColor, type Palette, type Rgb } from "./palette";
 import { CATEGORIES, grayOf, ScaleRange, scaleColor } from "./scale";
 
@@ -54,7 +54,7 @@ export class Coloring {
     if (this.mode === "own") return;
     if (this.mode === "group") return this.#colorGroups(palette);
     if (this.mode === "state") return this.#colorStates(frame, palette);
-    this.#colorScale(agents, palette);
+    this.#colorScale(frame, agents, palette);
   }
 
   #colorGroups(palette: Palette): void {
@@ -74,8 +74,8 @@ export class Coloring {
     this.legend = { kind: "categories", title: "State", entries: entries.filter(({ count }) => count > 0) };
   }
 
-  #colorScale(agents: AgentValues | null, palette: Palette): void {
-    const { values, title, unit, note } = this.#scaleValues(agents);
+  #colorScale(frame: Frame, agents: AgentValues | null, palette: Palette): void {
+    const { values, title, unit, note } = this.#scaleValues(frame, agents);
     const { agents: indices } = this.#bodies;
     const ofAgents = Float32Array.from(indices, (i) => values[i]!);
     this.range.include(ofAgents);
@@ -93,10 +93,15 @@ export class Coloring {
   }
 
   /** The value of each body, and what it is. */
-  #scaleValues(agents: AgentValues | null): { values: Float32Array; title: string; unit: string; note: string } {
+  #scaleValues(
+    frame: Frame,
+    agents: AgentValues | null,
+  ): { values: Float32Array; title: string; unit: string; note: string } {
     const { motion } = this;
     if (this.mode === "speed") {
-      const note = `mean over ${SPEED_WINDOW_CYCLES} cycles`;
+      const present = presentSpeeds(frame);
+      if (present) return { values: present, title: "Ground speed", unit: "m/s", note: "" };
+      const note = `mean over ${motion.window} cycles`;
       return { values: motion.speeds(this.#cycle_s), title: "Speed", unit: "m/s", note };
     }
     if (this.mode === "waiting") {
@@ -122,6 +127,13 @@ export class Coloring {
     }
     return tints;
   }
+}
+
+/** The speed of each body over the ground, where frames tell velocities, in meters per second; null where none does. */
+function presentSpeeds({ velocities_m_s: v }: Frame): Float32Array | null {
+  // Scenes that are no traffic have none, and a recording without velocities has zeros.
+  if (!v.some((speed_m_s) => speed_m_s !== 0)) return null;
+  return Float32Array.from({ length: v.length / 3 }, (_, i) => Math.hypot(v[3 * i]!, v[3 * i + 1]!));
 }
 
 /** What lets others shine through, such as a zone around an agent, keeps its own color. */

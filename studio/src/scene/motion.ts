@@ -44,8 +44,8 @@ export class Motion {
   push(cycle: number, positions_m: Float32Array, isSought: boolean): void {
     const gap = cycle - this.#cycle;
     if (gap === 0) return;
-    // A video seeks from frame to frame: within the window of means, a gap still tells of the motion.
-    const maxGap = isSought ? SPEED_WINDOW_CYCLES : Math.max(MAX_GAP_CYCLES, MAX_GAP_GROWTH * this.#stride);
+    // A video seeks from frame to frame, so that a short gap is none; long strides are those of play alone.
+    const maxGap = isSought ? MAX_GAP_CYCLES : Math.max(MAX_GAP_CYCLES, MAX_GAP_GROWTH * this.#stride);
     if (!(gap > 0 && gap <= maxGap)) return this.#restart(cycle, positions_m);
     this.#stride = gap;
     this.#cycle = cycle;
@@ -67,6 +67,11 @@ export class Motion {
   /** Cycles since each body was seen to move; at least so many, where it has not moved since all motion is known. */
   waiting(): Float32Array {
     return Float32Array.from(this.#arrived, (arrived) => this.#cycle - arrived);
+  }
+
+  /** The number of cycles over which speeds are means: more than usual where frames are far apart. */
+  get window(): number {
+    return Math.max(SPEED_WINDOW_CYCLES, this.#cycle - (this.#kept[0]?.cycle ?? this.#cycle));
   }
 
   /** The mean speed of each body over the last cycles, in meters per second; not a number where nothing is known. */

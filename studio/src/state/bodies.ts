@@ -1,7 +1,7 @@
 /** The bodies behind the columns of frames, with names and lookup. */
 
 import { bodyKey, bodyLabel } from "../format";
-import type { BodyTable, BodyId, SceneGroup } from "../protocol";
+import type { BodyId, BodyName, BodyTable, SceneGroup } from "../protocol";
 
 /** Agents that belong together: a group of the scenario, or the parts of one object. */
 export interface BodyGroup {
@@ -22,10 +22,13 @@ export class Bodies {
   /** The group of each body; -1 for none. */
   readonly groupOf: Int32Array;
   readonly #names: Map<number, string>;
+  /** Names of bodies that may be absent, by kind and number. */
+  readonly #sceneNames: Map<string, string>;
   readonly #indexByKey = new Map<string, number>();
 
-  constructor(table: BodyTable, groups: readonly SceneGroup[] = []) {
+  constructor(table: BodyTable, groups: readonly SceneGroup[] = [], names: readonly BodyName[] = []) {
     this.table = table;
+    this.#sceneNames = namesByBody(names);
     this.count = table.kind.length;
     this.#names = new Map(table.names);
     const agents: number[] = [];
@@ -104,7 +107,9 @@ export class Bodies {
 
   nameOf(id: BodyId): string {
     const index = this.find(id);
-    return index === undefined ? bodyLabel(id) : this.name(index);
+    if (index !== undefined) return this.name(index);
+    const name = this.#sceneNames.get(`${id.kind} ${id.number}`);
+    return name === undefined ? bodyLabel(id) : id.part === null ? name : `${name} ${id.part}`;
   }
 
   find(id: BodyId): number | undefined {
@@ -116,4 +121,9 @@ export class Bodies {
     const index = this.find(id);
     return index !== undefined && this.table.is_agent[index] === true;
   }
+}
+
+/** Names by kind and number. */
+export function namesByBody(names: readonly BodyName[]): Map<string, string> {
+  return new Map(names.map(({ kind, number, name }) => [`${kind} ${number}`, name]));
 }

@@ -3,7 +3,7 @@
 import { Credit } from "../credit";
 import { makeProblem } from "../connection";
 import { decodeFrame, FrameError, type Frame } from "../decode";
-import type { BodyTable, SceneGroup } from "../protocol";
+import type { BodyTable, Scene } from "../protocol";
 import { Bodies } from "./bodies";
 import { DroppedFrames } from "./dropped-frames";
 import type { SessionClient } from "./session-client.svelte";
@@ -78,8 +78,8 @@ export class Frames {
     return this.#listeners.size > 0 && !globalThis.document?.hidden;
   }
 
-  onBodyTable(table: BodyTable, groups: readonly SceneGroup[] = []): void {
-    this.bodies = new Bodies(table, groups);
+  onBodyTable(table: BodyTable, scene: Pick<Scene, "groups" | "names">): void {
+    this.bodies = new Bodies(table, scene.groups, scene.names);
     const frame = this.#framesWithoutTable.get(table.id);
     this.#framesWithoutTable.clear();
     if (frame) this.#show(frame);

@@ -140,7 +140,7 @@ export class Session {
   }
 
   onBodyTable(table: BodyTable): void {
-    this.frames.onBodyTable(table, this.run.scene.groups);
+    this.frames.onBodyTable(table, this.run.scene);
   }
 
   onFrame(bytes: ArrayBuffer): void {

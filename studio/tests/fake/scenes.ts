@@ -126,6 +126,10 @@ export function robots(count: number): FakeWorld {
         { name: "couriers", kind: "robot", first: 0, count: Math.ceil(count / 3) },
         { name: "guards", kind: "robot", first: Math.ceil(count / 3), count: count - Math.ceil(count / 3) },
       ],
+      names: [
+        { kind: "robot", number: 0, name: "courier Anna" },
+        { kind: "robot", number: 1, name: "courier Bert" },
+      ],
     },
     table: {
       kinds: ["robot"],
@@ -301,6 +305,7 @@ export function chain(): FakeWorld {
       cycle_s: 0.02,
       is_recording: false,
       groups: [],
+      names: [],
       floor: null,
       traffic: null,
       bodies: Array.from({ length: 80 }, (_, i) => ball(i)),
@@ -395,6 +400,7 @@ export function airplanes(): FakeWorld {
       cycle_s: 5,
       is_recording: false,
       groups: [],
+      names: Array.from({ length: n }, (_, i) => ({ kind: "airplane", number: i, name: `ONE${11 + i}` })),
       floor: null,
       traffic: {
         chart: { origin_deg: [52, 4.5], sphere_radius_m: null },

@@ -22,7 +22,8 @@ import {
   type SweepRun,
 } from "../../src/protocol";
 import { bodyKey } from "../../src/format";
-import { bodyNames, findEvents } from "../../src/replay/search";
+import { findEvents } from "../../src/replay/search";
+import { namesByBody } from "../../src/state/bodies";
 import { check, edited, modelOf, SCHEMA, textOf } from "./edit";
 import { declaredEditing } from "./editing";
 import { encodeFrame } from "./encode";
@@ -555,6 +556,7 @@ function runs(): ReplyBody {
     replay: { kind: "scenario", path: "robots.toml" },
     // The third run of the first variant lies far from the others.
     values: failure ? [null, null] : [variant === "count = 4" && seed === 3 ? 90 : 10 + seed, 0.5 + 1e-9 * seed],
+    outliers: variant === "count = 4" && seed === 3 ? [{ column: 0, is_high: true, distance_ranges: 30 }] : [],
   });
   return {
     is: "runs",
@@ -566,6 +568,7 @@ function runs(): ReplyBody {
       { key: "speed", label: "mean speed", unit: "m/s" },
     ],
     columns_left_out: 4,
+    outlier_rule: "An outlier lies more than 1.5 interquartile ranges outside the quartiles.",
     runs: [...[1, 2, 3, 4, 5, 6].map((seed) => run("count = 4", seed)), run("count = 8", 1, "the disk is full")],
   };
 }
@@ -608,7 +611,7 @@ function act(call: Exclude<SessionMethod, { do: "save" }>, run: Run): ReplyBody 
       return agentMetrics(run, call.metric);
     case "find-events": {
       const all = run.world.events(0, run.cycle);
-      return findEvents(all, call, bodyNames([{ ...run.world.table, session: 1, id: 1 }]), 0);
+      return findEvents(all, call, namesByBody(run.world.scene.names), 0);
     }
     case "events": {
       const all = run.world.events(call.from, call.until).slice(call.skip ?? 0);

@@ -198,6 +198,19 @@ test("in a video, which seeks from frame to frame, speeds are known", () => {
   const motion = new Motion(1, 2);
   for (let cycle = 0; cycle <= 60; cycle += 15) motion.push(cycle, Float32Array.from([2 * cycle, 0]), true);
   expect(motion.speeds(1)[0]).toBeCloseTo(2, 6);
+  expect(motion.window).toBe(30);
+  for (let cycle = 160; cycle <= 360; cycle += 100) motion.push(cycle, Float32Array.from([2 * cycle, 0]), true);
+  expect(motion.speeds(1)[0]).toBeCloseTo(2, 6);
+  expect(motion.window).toBe(100);
+});
+
+test("the speed of traffic is that of its velocities, over the ground and at once", () => {
+  const coloring = new Coloring(bodies(), 3, 1);
+  coloring.setMode("speed");
+  const velocities_m_s = Float32Array.from([3, 4, 12, 0, 0, 5, 0, 8, 0, 0, 0, 0, 0, 0, 0]);
+  coloring.update({ ...frame(0, [], [0, 0, 0, 0, 0], 3), velocities_m_s }, null, light);
+  expect([...coloring.values!]).toEqual([5, 0, 8, 0, 0]);
+  expect(coloring.legend).toMatchObject({ kind: "scale", title: "Ground speed", note: "" });
 });
 
 test("the legend of an image lists what that of the page does", () => {

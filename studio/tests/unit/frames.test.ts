@@ -64,7 +64,7 @@ test("credit for frames that cannot be read is granted again, at most once a sec
 
 test("a hidden session is granted few frames, and does not count skipped ones as dropped", () => {
   const { frames, host } = openFrames();
-  frames.onBodyTable(EMPTY_TABLE);
+  frames.onBodyTable(EMPTY_TABLE, { groups: [], names: [] });
   frames.grantHidden();
   frames.onFrame(emptyFrame(1, 0));
   frames.onFrame(emptyFrame(2, 20));
@@ -85,13 +85,13 @@ test("a frame that arrives before its body table is shown once the table is ther
   frames.subscribe(() => notified++);
   frames.onFrame(emptyFrame(5, 0));
   expect([shown, notified]).toEqual([[], 0]);
-  frames.onBodyTable(EMPTY_TABLE);
+  frames.onBodyTable(EMPTY_TABLE, { groups: [], names: [] });
   expect([shown, notified, frames.newest?.cycle, frames.isAfterSeek]).toEqual([[5], 1, 5, true]);
 });
 
 test("waiting for a cycle ends with its frame, or with the wait's end", async () => {
   const { frames } = openFrames();
-  frames.onBodyTable(EMPTY_TABLE);
+  frames.onBodyTable(EMPTY_TABLE, { groups: [], names: [] });
   const frame = frames.waitForCycle(6);
   frames.onFrame(emptyFrame(5, 0));
   frames.onFrame(emptyFrame(6, 0));

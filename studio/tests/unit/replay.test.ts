@@ -159,6 +159,7 @@ function replayText(): string {
           floor: null,
           bodies: [],
           groups: [],
+          names: [],
           is_recording: true,
           traffic: null,
         },

@@ -33,6 +33,7 @@ test("requests of a report's page are validated, and runs are found by name or n
     failure: "",
     replay: { kind: "scenario", path: "x" },
     values: [],
+    outliers: [],
   });
   const runs = [run("n=1", "7"), run("n=1", "8"), run("n=2", "7")];
   const found = (data: unknown) => {

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { listRuns, nextOrder, sortRuns, type Order } from "../../src/state/sweep-runs";
+import { nextOrder, sortRuns, sweepRows, type Order } from "../../src/state/sweep-runs";
 import type { SweepRun } from "../../src/protocol";
 
 const run = (variant: string, seed: number, ...values: (number | null)[]): SweepRun => ({
@@ -8,34 +8,26 @@ const run = (variant: string, seed: number, ...values: (number | null)[]): Sweep
   failure: "",
   replay: { kind: "scenario", path: "x" },
   values,
+  outliers: [],
 });
 
-const marks = (runs: SweepRun[]) => listRuns(runs, [0]).map(({ sides }) => sides[0]);
-
-test("a run far from the others of its variant is marked on its side, and only there", () => {
-  // The quartiles are 3 and 7: 13 is 1.5 ranges above, and not beyond.
-  const nine = (last: number) => [1, 2, 3, 4, 5, 6, 7, 8, last].map((value, seed) => run("a", seed, value));
-  expect(marks(nine(13))).toEqual(Array(9).fill(0));
-  expect(marks(nine(13.1))).toEqual([...Array(8).fill(0), 1]);
-  expect(marks(nine(-30)).at(-1)).toBe(-1);
-  // The same value is usual in another variant.
-  const other = [13.1, 13, 13.2, 13.1, 12.9].map((value, seed) => run("b", seed, value));
-  expect(marks([...nine(13.1), ...other]).filter((side) => side !== 0)).toEqual([1]);
-});
-
-test("few runs, rounding and missing values make no outlier", () => {
-  expect(marks([1, 1, 1, 90].map((value, seed) => run("a", seed, value)))).toEqual([0, 0, 0, 0]);
-  const third = 1 / 3;
-  expect(marks([third, third, third, third, third, third + 1e-16].map((v, seed) => run("a", seed, v)))).toEqual(
-    Array(6).fill(0),
-  );
-  const nearly = [third, third, third, third, third + 1e-16, 5];
-  expect(marks(nearly.map((v, seed) => run("a", seed, v)))).toEqual([0, 0, 0, 0, 0, 1]);
-  expect(marks([1, 1, 1, 1, null, 9].map((value, seed) => run("a", seed, value)))).toEqual([0, 0, 0, 0, 0, 1]);
+test("a run is marked in the columns that are shown, on the side of its outlier", () => {
+  const outliers = [
+    { column: 0, is_high: true, distance_ranges: 3 },
+    { column: 2, is_high: false, distance_ranges: null },
+  ];
+  const runs = [run("a", 1, 1, 2, 3), { ...run("a", 2, 9, 2, -7), outliers }];
+  expect(sweepRows(runs, [2, 0, 1]).map(({ sides }) => sides)).toEqual([
+    [0, 0, 0],
+    [-1, 1, 0],
+  ]);
+  expect(sweepRows(runs, [0]).map(({ distance }) => distance)).toEqual([0, 3]);
+  expect(sweepRows(runs, [2]).map(({ distance }) => distance)).toEqual([0, Infinity]);
+  expect(sweepRows(runs, [1]).map(({ distance }) => distance)).toEqual([0, 0]);
 });
 
 test("runs are sorted by any column, and those without a value come last either way", () => {
-  const listed = listRuns([run("n = 10", 1, 5), run("n = 9", 12, null), run("n = 9", 2, 7)], [0]);
+  const listed = sweepRows([run("n = 10", 1, 5), run("n = 9", 12, null), run("n = 9", 2, 7)], [0]);
   const seeds = (order: Order) => sortRuns(listed, order).map((one) => one.run.seed);
   expect(seeds({ key: 0, isDescending: true })).toEqual(["2", "1", "12"]);
   expect(seeds({ key: 0, isDescending: false })).toEqual(["1", "2", "12"]);
@@ -44,13 +36,13 @@ test("runs are sorted by any column, and those without a value come last either 
 });
 
 test("outliers come first, the most distant one above all", () => {
-  const values = [10, 11, 12, 13, 14, 10, 11, 12, 13, 14, 40, 90];
-  const listed = listRuns(
-    values.map((value, seed) => run("a", seed, value)),
-    [0],
-  );
-  const sorted = sortRuns(listed, { key: "outliers", isDescending: true });
-  expect(sorted.map((one) => one.run.values[0]).slice(0, 3)).toEqual([90, 40, 10]);
+  const at = (seed: number, distance_ranges: number | null) => ({
+    ...run("a", seed, seed),
+    outliers: [{ column: 0, is_high: true, distance_ranges }],
+  });
+  const rows = sweepRows([run("a", 1, 1), at(2, 4), at(3, 9), at(4, null), run("a", 5, 5)], [0]);
+  const sorted = sortRuns(rows, { key: "outliers", isDescending: true });
+  expect(sorted.map((one) => one.run.seed)).toEqual(["4", "3", "2", "1", "5"]);
 });
 
 test("a heading turns its order around, and numbers begin with the largest", () => {

@@ -139,7 +139,7 @@ fn draw_scene(
     legend: LegendPlace,
 ) -> Result<DrawnPicture, DrawError> {
     if let Some(traffic) = scene.scenery.traffic.as_ref().filter(|_| options.view.is_from_above()) {
-        return plan::draw(scene, traffic, options);
+        return plan::draw(scene, traffic, options, legend);
     }
     if scene.is_plane() {
         return on_sheet(scene, options, (["x", "y"], Camera::ABOVE), legend);

@@ -9,7 +9,7 @@ use crate::ticks::{LabelSpacing, Ticks, decimals, label, nice_step};
 pub(super) const EDGE_PX: f64 = 10.0;
 const TICK_PX: f64 = 4.0;
 /// Gap between the map and a legend beside it.
-const COLUMN_GAP_PX: f64 = 16.0;
+pub(super) const COLUMN_GAP_PX: f64 = 16.0;
 /// The length of "y (m)" in letter sizes.
 const Y_LABEL_LETTERS: f64 = 3.0;
 /// Least width of a picture, in letters, to make room for title and legend, and for a legend alone.

@@ -98,9 +98,14 @@ impl ColumnEncoder {
     /// Appends values that fit into the page.
     fn extend(&mut self, values: &ColumnValues, range: Range<usize>) {
         let Some(levels) = &mut self.levels else { return self.encoder.extend(values, range) };
-        let flags: Vec<u32> = range.clone().map(|row| u32::from(!values.is_missing(row))).collect();
+        // Most columns that may lack values lack none: these are encoded where they lie.
+        let Some(valid) = values.valid() else {
+            levels.extend(&vec![1; range.len()]);
+            return self.encoder.extend(values, range);
+        };
+        let flags: Vec<u32> = valid[range.clone()].iter().map(|&is_valid| is_valid.into()).collect();
         levels.extend(&flags);
-        let present: Vec<usize> = range.filter(|&row| !values.is_missing(row)).collect();
+        let present: Vec<usize> = range.filter(|&row| valid[row]).collect();
         self.encoder.extend(&values.gather_rows(&present), 0..present.len());
     }
 

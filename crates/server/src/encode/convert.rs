@@ -1,7 +1,7 @@
 //! Views of the kernel as types of the protocol.
 
 use crate::protocol::{
-    Appearance, BodyId, EarthChart, OccupancyGrid, Problem, RunEvent, Scan, Scene, SceneGroup,
+    Appearance, BodyId, BodyName, EarthChart, OccupancyGrid, Problem, RunEvent, Scan, Scene, SceneGroup,
     Shape, StaticBody, Traffic, TrafficArea, TrafficRoute,
 };
 use sidestep_kernel::InputError;
@@ -21,9 +21,14 @@ pub(crate) fn scene(world: &str, agent: &str, scenery: &Scenery, is_recording: b
         floor: scenery.floor.as_ref().map(occupancy_grid),
         bodies: scenery.bodies.iter().map(|body| static_body(body, scenery)).collect(),
         groups: scenery.groups.iter().map(group).collect(),
+        names: scenery.names.iter().map(body_name).collect(),
         is_recording,
         traffic: scenery.traffic.as_ref().map(|plan| traffic(plan, scenery)),
     }
+}
+
+fn body_name((kind, number, name): &(BodyKind, u32, String)) -> BodyName {
+    BodyName { kind: kind.name().into(), number: *number, name: name.clone() }
 }
 
 fn group(group: &AgentGroup) -> SceneGroup {

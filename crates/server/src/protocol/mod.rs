@@ -47,13 +47,13 @@ pub use replay::{
 pub use reply::{
     FileEntry, FileKind, GalleryEntry, MetricName, MetricRow, Problem, Reply, ReplyBody,
     ReplyResult, ServerNotification, ServerUsage, SessionState, SessionStatus, StoreUsage,
-    SweepColumn, SweepRun, TargetRef,
+    SweepColumn, SweepOutlier, SweepRun, TargetRef,
 };
 pub use request::{
     BodyId, ClientRequest, OpenTarget, RunMethod, ServerMethod, SessionMethod, Speed,
 };
 pub use scene::{
-    Appearance, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, SceneGroup, Shape,
+    Appearance, BodyName, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, SceneGroup, Shape,
     StaticBody,
 };
 pub use traffic::{BodyTrail, EarthChart, Traffic, TrafficArea, TrafficRoute};

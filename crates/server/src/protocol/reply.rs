@@ -148,6 +148,8 @@ pub enum ReplyBody {
         columns_left_out: u32,
         /// The runs.
         runs: Vec<SweepRun>,
+        /// The rule by which a run is an outlier, in words.
+        outlier_rule: String,
         /// Number of runs that are not listed.
         left_out: u64,
     },
@@ -318,6 +320,20 @@ pub struct SweepRun {
     pub replay: TargetRef,
     /// Its results, column by column; null where it has none.
     pub values: Vec<Option<f64>>,
+    /// The results that are far from those of the other runs of its variant.
+    pub outliers: Vec<SweepOutlier>,
+}
+
+/// A result of a run that is far from those of the other runs of its variant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct SweepOutlier {
+    /// The place of its column.
+    pub column: u32,
+    /// Whether it is above the others.
+    pub is_high: bool,
+    /// Its distance from the nearer quartile in interquartile ranges; null where the quartiles are equal.
+    pub distance_ranges: Option<f64>,
 }
 
 /// The kind of a file or a folder.

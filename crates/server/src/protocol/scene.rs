@@ -23,10 +23,24 @@ pub struct Scene {
     pub bodies: Vec<StaticBody>,
     /// Agents that the scenario describes together.
     pub groups: Vec<SceneGroup>,
+    /// The names of all bodies that have some, also of those that are not there yet, or gone.
+    pub names: Vec<BodyName>,
     /// Whether a recorded run is computed again.
     pub is_recording: bool,
     /// What a plan view shows of traffic; none where the scene is no traffic.
     pub traffic: Option<Traffic>,
+}
+
+/// The name of a body, which all its parts share.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub struct BodyName {
+    /// Its kind.
+    pub kind: String,
+    /// Its number among the bodies of its kind.
+    pub number: u32,
+    /// Its name.
+    pub name: String,
 }
 
 /// Agents that the scenario describes together, such as couriers.

@@ -18,6 +18,8 @@ use sidestep_kernel::view::{Body, Frame, FrameOptions, ScanSelection, Scenery};
 use sidestep_kernel::{Cycle, InputError, Simulation};
 use sidestep_session::{Error, FrameSink, Thumbnail};
 
+/// Maximum number of events in a file, so that it stays one that is sent: further ones are counted.
+const MAX_EVENTS: u64 = 100_000;
 /// Number of events in a part: a browser reads one within a picture.
 const EVENTS_PER_PART: u32 = 5000;
 /// Maximum number of inspections: some gigabytes of text before it is compressed.
@@ -87,7 +89,7 @@ impl<'a> ReplayCollector<'a> {
             chunks: Vec::new(),
             cycles: Vec::new(),
             tables: TableParts::default(),
-            log: EventStore::default(),
+            log: EventStore::new(MAX_EVENTS),
             metrics,
             agents,
             inspections: InspectionParts::default(),

@@ -1,11 +1,13 @@
 //! The runs of a sweep, each with its results and the target that opens it.
 
 use crate::encode::problem;
-use crate::protocol::{Problem, ReplyBody, SweepColumn, SweepRun, TargetRef};
+use crate::protocol::{Problem, ReplyBody, SweepColumn, SweepOutlier, SweepRun, TargetRef};
 use serde::Deserialize;
+use sidestep_experiment::sweep::outliers::{OUTLIER_RULE, outliers};
 use sidestep_experiment::sweep::{Role, RunColumn, RunTable};
 use sidestep_scenario::{MetricLabel, Source, WorldType, Worlds, metric_label};
 use sidestep_session::sweep::{FinishedRuns, Folder, read_finished};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Maximum number of runs listed: a longer list is sent and shown too slowly, and nobody reads it.
@@ -35,6 +37,7 @@ pub(crate) fn list_sweep_runs(path: &Path, worlds: &Worlds) -> Result<ReplyBody,
     let world_type = world_type_of(&folder, worlds);
     let (results, columns_left_out) = listed_results(&table, world_type);
     let all = table.runs();
+    let mut outliers_of = outliers_by_row(&table, &results);
     let mut runs = Vec::new();
     for row in 0..all.min(MAX_RUNS) {
         let id = table.column("cell").and_then(|column| column.values.number(row));
@@ -47,6 +50,7 @@ pub(crate) fn list_sweep_runs(path: &Path, worlds: &Worlds) -> Result<ReplyBody,
             failure,
             replay: replay_target(&folder, trial.id, trial.variant),
             values: results.iter().map(|column| finite_number(column, row)).collect(),
+            outliers: outliers_of.remove(&row).unwrap_or_default(),
         });
     }
     Ok(ReplyBody::Runs {
@@ -55,6 +59,7 @@ pub(crate) fn list_sweep_runs(path: &Path, worlds: &Worlds) -> Result<ReplyBody,
         columns: results.iter().map(|column| sweep_column(column, world_type)).collect(),
         columns_left_out,
         runs,
+        outlier_rule: OUTLIER_RULE.to_string(),
         left_out: all.saturating_sub(MAX_RUNS) as u64,
     })
 }
@@ -82,6 +87,21 @@ fn listed_results<'t>(
     listed.truncate(MAX_COLUMNS);
     let left_out = (all.len() - listed.len()) as u32;
     (listed, left_out)
+}
+
+/// Returns the outliers among the results that are listed, by the row of their run.
+fn outliers_by_row(table: &RunTable, results: &[&RunColumn]) -> BTreeMap<usize, Vec<SweepOutlier>> {
+    let mut by_row: BTreeMap<usize, Vec<SweepOutlier>> = BTreeMap::new();
+    for (place, column) in results.iter().enumerate() {
+        for outlier in outliers(table, &[&column.name]) {
+            by_row.entry(outlier.row).or_default().push(SweepOutlier {
+                column: place as u32,
+                is_high: outlier.is_high,
+                distance_ranges: Some(outlier.distance_ranges).filter(|ranges| ranges.is_finite()),
+            });
+        }
+    }
+    by_row
 }
 
 /// Returns whether a column has numbers that differ by more than rounding.
@@ -112,4 +132,33 @@ fn replay_target(folder: &Folder, trial: u64, variant: u32) -> TargetRef {
     let kind = if is_recorded { "recording" } else { "scenario" };
     let path = if is_recorded { recording } else { folder.scenario(variant) };
     TargetRef { kind: kind.into(), path: path.display().to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_kernel::ports::ColumnValues;
+
+    #[test]
+    fn outliers_are_told_with_their_run_and_the_place_of_their_column() {
+        let column = |name: &str, role, values: [f64; 6]| RunColumn {
+            name: name.into(),
+            role,
+            values: ColumnValues::F64(values.into_iter().map(Some).collect()),
+        };
+        let columns = vec![
+            column("variant", Role::Variant, [0.0; 6]),
+            column("hops", Role::Metric, [1.0, 2.0, 3.0, 4.0, 5.0, -90.0]),
+            column("trips", Role::Metric, [7.0, 7.0, 9.0, 7.0, 7.0, 7.0]),
+        ];
+        let table = RunTable { columns };
+        let [_, hops, trips] = &table.columns[..] else { panic!("three columns") };
+        let found = outliers_by_row(&table, &[trips, hops]);
+        let high = SweepOutlier { column: 0, is_high: true, distance_ranges: None };
+        assert_eq!(found[&2], [high], "the quartiles are equal");
+        let [low] = &found[&5][..] else { panic!("one outlier") };
+        assert_eq!((low.column, low.is_high), (1, false));
+        assert!(low.distance_ranges.is_some_and(|ranges| ranges > 1.5));
+        assert_eq!(found.len(), 2);
+    }
 }

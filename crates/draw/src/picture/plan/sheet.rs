@@ -11,7 +11,7 @@ use super::{Plan, Scene};
 use crate::error::DrawError;
 use crate::legend::{Legend, LegendEntry, LegendSymbol, paragraph, small_print_style, title_style};
 use crate::picture::canvas::Canvas;
-use crate::picture::sheet::EDGE_PX;
+use crate::picture::sheet::{COLUMN_GAP_PX, EDGE_PX, LegendPlace};
 use crate::picture::{DrawnPicture, PictureOptions, extent};
 use crate::style::{FAINT_INK, GRID, INK, Style, hex};
 use crate::svg::{Anchor, Rect, Svg, SvgNumber, TextStyle};
@@ -32,11 +32,12 @@ const MIN_WIDTH_LETTERS: f64 = 34.0;
 /// Color of symbols in the legend that stand for all colors.
 const ANY_COLOR: &str = "#707070";
 
-/// Draws traffic in plan view.
+/// Draws traffic in plan view, with its legend somewhere.
 pub(in crate::picture) fn draw(
     scene: &Scene<'_>,
     traffic: &TrafficPlan,
     options: &PictureOptions,
+    place: LegendPlace,
 ) -> Result<DrawnPicture, DrawError> {
     let style = &options.style;
     let [low_m, high_m] = extent::scene_bounds(scene)?;
@@ -49,12 +50,9 @@ pub(in crate::picture) fn draw(
         [high_m[0], high_m[1]],
         range_m.is_some(),
     );
-    let mut svg = Svg::default();
-    let text_width_px = layout.width_px - 2.0 * EDGE_PX;
-    let title = text::wrap(&options.title, style.title_px(), Weight::Bold, text_width_px);
-    let top = paragraph(&mut svg, &title, (EDGE_PX, EDGE_PX), &title_style(style.title_px()));
-    let window = layout.window([low_m[0], low_m[1]], top);
-    let plan = Plan {
+    // What the legend says depends on the scale alone, and how wide the page is on what it says.
+    let window = layout.window([low_m[0], low_m[1]], 0.0);
+    let mut plan = Plan {
         scene,
         traffic,
         units: Units::of_scenery(scene.scenery),
@@ -63,7 +61,15 @@ pub(in crate::picture) fn draw(
         lookahead_s: lookahead_s(scene.frame, Plan::extent_m(&window)),
         name_x_px: EDGE_PX + style.font_px,
     };
-    let mut sheet = PlanSheet { plan: &plan, areas: &areas, svg, top: window.map.bottom() };
+    let entries = plan.legend_entries(&areas);
+    let width_px = layout.page_width_px(place, &entries);
+    let mut svg = Svg::default();
+    let text_width_px = width_px - 2.0 * EDGE_PX;
+    let title = text::wrap(&options.title, style.title_px(), Weight::Bold, text_width_px);
+    let top = paragraph(&mut svg, &title, (EDGE_PX, EDGE_PX), &title_style(style.title_px()));
+    plan.window = layout.window([low_m[0], low_m[1]], top);
+    let top = plan.window.map.bottom();
+    let mut sheet = PlanSheet { plan: &plan, areas: &areas, svg, top };
     let blocks = sheet.draw_plan();
     let mut notes = plan.notes(blocks);
     if let Some(range_m) = range_m {
@@ -73,9 +79,12 @@ pub(in crate::picture) fn draw(
             "Below, altitudes seen from the south, drawn {times} times as long as distances."
         ));
     }
-    sheet.draw_legend(layout.width_px);
+    match place {
+        LegendPlace::Below => sheet.draw_legend_below(entries, width_px),
+        LegendPlace::Beside => sheet.draw_legend_beside(entries, width_px),
+    }
     let words = format!("{} {}", options.caption, notes.join(" "));
-    let svg = sheet.finish(&words, &options.title, layout.width_px);
+    let svg = sheet.finish(&words, &options.title, width_px);
     Ok(DrawnPicture { svg, px_per_m: layout.px_per_m })
 }
 
@@ -87,7 +96,10 @@ fn nice_ratio(ratio: f64) -> String {
 
 /// Sizes that follow from the extent of what is shown.
 struct SheetLayout {
-    width_px: f64,
+    /// Size of small letters,
+    size_px: f64,
+    /// and the least width of the page.
+    min_width_px: f64,
     left_px: f64,
     map_width_px: f64,
     map_height_px: f64,
@@ -120,11 +132,28 @@ impl SheetLayout {
         let altitude_px = text::width("10 000", size_px, Weight::Regular);
         let label_px = label_px.fold(altitude_px, f64::max);
         let left_px = (EDGE_PX + 1.5 * style.font_px + label_px + TICK_PX + 4.0).ceil();
-        let width_px = (left_px + map_width_px + 2.0 * EDGE_PX + size_px)
-            .max(MIN_WIDTH_LETTERS * style.font_px);
+        let min_width_px = MIN_WIDTH_LETTERS * style.font_px;
         let [least_px, most_px] = PROFILE_HEIGHT_PX;
         let profile_height_px = (part * map_height_px).clamp(least_px, most_px);
-        Self { width_px, left_px, map_width_px, map_height_px, profile_height_px, px_per_m }
+        Self {
+            size_px,
+            min_width_px,
+            left_px,
+            map_width_px,
+            map_height_px,
+            profile_height_px,
+            px_per_m,
+        }
+    }
+
+    /// Returns the width of the page with a legend.
+    fn page_width_px(&self, place: LegendPlace, entries: &[LegendEntry]) -> f64 {
+        let column_px = match place {
+            LegendPlace::Below => 0.0,
+            LegendPlace::Beside => COLUMN_GAP_PX + Legend::column_px(entries, self.size_px),
+        };
+        let own_px = self.left_px + self.map_width_px + column_px + 2.0 * EDGE_PX + self.size_px;
+        own_px.max(self.min_width_px)
     }
 
     /// Returns the window of the plan below `top`.
@@ -300,11 +329,11 @@ impl PlanSheet<'_> {
         profile
     }
 
-    fn draw_legend(&mut self, width_px: f64) {
+    /// Draws the scale bar, and the legend in rows beside it.
+    fn draw_legend_below(&mut self, entries: Vec<LegendEntry>, width_px: f64) {
         let plan = self.plan;
         let top = self.top + 12.0;
         let bar_px = draw_scale_bar(&mut self.svg, plan, (plan.window.map.x, top), width_px);
-        let entries = plan.legend_entries(self.areas);
         let size_px = plan.style.small_px();
         let beside = plan.window.map.x + bar_px + 2.0 * plan.style.font_px;
         let widths =
@@ -321,6 +350,18 @@ impl PlanSheet<'_> {
         legend.draw(&mut self.svg, left, legend_top);
         let bottom = (legend_top + 4.0 + legend.height_px()).max(top + 2.4 * size_px);
         self.top = bottom + 6.0;
+    }
+
+    /// Draws the legend in a column on the right of the plan, and the scale bar below the plan.
+    fn draw_legend_beside(&mut self, entries: Vec<LegendEntry>, width_px: f64) {
+        let map = self.plan.window.map;
+        let size_px = self.plan.style.small_px();
+        let top = self.top + 12.0;
+        draw_scale_bar(&mut self.svg, self.plan, (map.x, top), width_px);
+        let column_px = Legend::column_px(&entries, size_px);
+        let legend = Legend::new(entries, size_px, column_px);
+        legend.draw(&mut self.svg, map.right() + COLUMN_GAP_PX, map.y);
+        self.top = (top + 2.4 * size_px).max(map.y + legend.height_px()) + 6.0;
     }
 
     fn finish(mut self, words: &str, title: &str, width_px: f64) -> String {

@@ -252,3 +252,22 @@ fn aircraft_that_are_gone_leave_their_trail_with_its_name() {
     assert_eq!(elements(&svg, r#"class="trail""#).len(), 1);
     assert!(elements(&svg, r#"class="vector""#).is_empty());
 }
+
+#[test]
+fn in_a_wide_picture_the_legend_stands_beside_the_plan_which_is_larger_for_it() {
+    let drawn = |size_px| {
+        let page = PictureOptions::page(&traffic(), "");
+        let options = PictureOptions { size_px: Some(size_px), ..page };
+        draw(&traffic(), &two(), &[], &options).unwrap()
+    };
+    let legend_place = |svg: &str| {
+        let entries = elements(svg, "velocity: where it is in");
+        let plan = elements(svg, r#"class="plan""#);
+        let right = number(plan[0], "x") + number(plan[0], "width");
+        (number(entries[0], "x") > right, number(plan[0], "width"))
+    };
+    let (is_beside, _) = legend_place(&drawn([700, 900]));
+    assert!(!is_beside, "a high picture has more room below");
+    let (is_beside, width_px) = legend_place(&drawn([1600, 700]));
+    assert!(is_beside && width_px > 500.0, "{width_px}");
+}

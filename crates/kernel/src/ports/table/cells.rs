@@ -165,8 +165,10 @@ impl<T> FromIterator<T> for Cells<T> {
 
 impl<T: Clone + Default> FromIterator<Option<T>> for Cells<T> {
     fn from_iter<I: IntoIterator<Item = Option<T>>>(values: I) -> Self {
+        let values = values.into_iter();
         let mut cells = Self::default();
-        values.into_iter().for_each(|value| cells.push(value));
+        cells.values.reserve(values.size_hint().0);
+        values.for_each(|value| cells.push(value));
         cells
     }
 }
