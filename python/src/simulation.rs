@@ -217,7 +217,7 @@ impl Simulation {
             let renderer = match kept.take() {
                 Some((kept_look, renderer)) if is_kept && kept_look == look => renderer,
                 _ => AnimationRenderer::new(scenery, std::slice::from_ref(&frame), &look)
-                    .map_err(|e| look_error(&e))?,
+                    .map_err(|e| look_error(&e, look.size))?,
             };
             let caption = format!("cycle {}", frame.cycle);
             let still = renderer.render(&frame, &[], &caption).map_err(|e| draw_error(&e))?;
@@ -296,10 +296,16 @@ fn parse_look(
     })
 }
 
-fn look_error(error: &DrawError) -> PyErr {
+/// Returns the error of a picture that cannot be drawn, with the argument that is wrong.
+fn look_error(error: &DrawError, size: AnimationSize) -> PyErr {
     match error {
         DrawError::FlatView(_) => {
             argument_error("view", error.to_string(), "give \"top\", or leave it out")
+        }
+        _ if matches!(size, AnimationSize::Exact(_)) => {
+            let remedy =
+                "give a width and a height of at most 4096 pixels, with room for the line of text";
+            argument_error("size", error.to_string(), remedy)
         }
         _ => argument_error("width", error.to_string(), "give 1 to 4096 pixels"),
     }

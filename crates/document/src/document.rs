@@ -3,6 +3,7 @@
 
 use super::claim::Claim;
 use super::{Figure, Table};
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde::Serialize;
 
 /// A report.
@@ -179,10 +180,24 @@ fn push_plain(spans: &mut Vec<Span>, text: &str) {
     }
 }
 
+/// What has a meaning in addresses, in HTML or in Markdown.
+const ENCODED: &AsciiSet =
+    &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b'/');
+
+/// Returns the address of a file from its path relative to the page that links it.
+fn relative_address(path: &str) -> String {
+    utf8_percent_encode(path, ENCODED).to_string()
+}
+
 impl Document {
     /// Returns a report that has only a title and `lead`.
     pub fn new(title: impl Into<String>, lead: impl Into<Text>) -> Self {
         Self { title: title.into(), lead: lead.into(), blocks: Vec::new(), replay: None }
+    }
+
+    /// Returns the address of the replay, relative to the report.
+    pub fn replay_address(&self) -> Option<String> {
+        self.replay.as_deref().map(relative_address)
     }
 
     /// Starts a section.
@@ -254,6 +269,17 @@ pub fn paper_document(title: &str, lead: String, quick: bool, claims: &[Claim]) 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_address_of_a_replay_leads_to_its_file_whatever_its_name() {
+        let address = |name: &str| {
+            let replay = Some(name.to_string());
+            Document { replay, ..Document::new("", Text::from_markup("")) }.replay_address()
+        };
+        assert_eq!(address("office-2.replay.html").as_deref(), Some("office-2.replay.html"));
+        let odd = address("a b#1?/50%ü.html");
+        assert_eq!(odd.as_deref(), Some("a%20b%231%3F/50%25%C3%BC.html"));
+    }
 
     #[test]
     fn marks_become_spans_and_a_mark_alone_stays_a_character() {

@@ -9,6 +9,9 @@ pub struct Figure {
     pub title: String,
     /// The meaning of the intervals and the number of runs; may be empty.
     pub note: String,
+    /// What the legend says of means and their intervals; empty where the note says it.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub interval_words: String,
     /// The horizontal quantity, with its unit.
     pub x_label: String,
     /// The vertical quantity, with its unit.
@@ -67,6 +70,8 @@ pub enum FigureKind {
         rows: Vec<String>,
         /// The effects in words, series by series and row by row.
         texts: Vec<Vec<String>>,
+        /// What is said of them.
+        words: ForestWords,
     },
     /// Single runs in named slots: a series is a slot, `x` the number of a seed, `y` the value of its run.
     Runs {
@@ -93,6 +98,15 @@ pub enum FigureKind {
         /// The corners of the front.
         corners: Vec<(f64, f64)>,
     },
+}
+
+/// What a forest says of its effects.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct ForestWords {
+    /// The head of the effects in words; may be empty.
+    pub heading: String,
+    /// Why an effect has words and no mark; may be empty.
+    pub unmarked: String,
 }
 
 /// What the legend of a figure of single runs calls its marks.
@@ -146,6 +160,13 @@ impl Figure {
         self.series.iter().flat_map(|s| &s.points).any(|p| p.interval.is_some())
     }
 
+    /// Returns the numbers of runs behind its points, in words: "n = 8" or "n = 6 to 8"; `None` where none has one.
+    pub fn runs_words(&self) -> Option<String> {
+        let counts = || self.series.iter().flat_map(|s| &s.points).filter_map(|p| p.n);
+        let (least, most) = counts().min().zip(counts().max())?;
+        Some(if least == most { format!("n = {most}") } else { format!("n = {least} to {most}") })
+    }
+
     /// Returns the same figure, of which a page shows the title alone until it is opened.
     #[must_use]
     pub fn folded(self) -> Self {
@@ -180,7 +201,8 @@ impl Figure {
                 let has_mean = slots.iter().any(|slot| slot.mean.is_some());
                 seed.into_iter().chain(has_mean.then_some(&legend.mean)).collect()
             }
-            _ => Vec::new(),
+            _ if self.interval_words.is_empty() => Vec::new(),
+            _ => vec![&self.interval_words],
         }
     }
 
@@ -188,14 +210,14 @@ impl Figure {
     pub fn legend_words_mut(&mut self) -> Vec<&mut String> {
         match &mut self.kind {
             FigureKind::Runs { legend, .. } => vec![&mut legend.seed, &mut legend.mean],
-            _ => Vec::new(),
+            _ => vec![&mut self.interval_words],
         }
     }
 
     /// Returns the names of the positions and of the values of its points, as heads of columns.
     pub fn column_labels(&self) -> [&str; 2] {
         match &self.kind {
-            FigureKind::Forest { .. } => ["row", &self.x_label],
+            FigureKind::Forest { .. } => ["metric", &self.x_label],
             FigureKind::Runs { .. } => ["replicate", &self.y_label],
             FigureKind::Heat { value_label, .. } => [&self.x_label, value_label],
             _ => [&self.x_label, &self.y_label],
@@ -203,10 +225,12 @@ impl Figure {
     }
 
     /// Returns the points as a table of comma-separated values with a head: the series, the position, the value, the
-    /// ends of its interval and of that of the position, and the number of runs; what a point has not is empty.
+    /// ends of its 95 % interval and of that of the position, and the number of runs; what a point has not is empty, and
+    /// what none has is no column.
     pub fn csv(&self) -> String {
-        let [x, y] = self.column_labels().map(csv_cell);
-        let mut text = format!("series,{x},{y},low,high,x_low,x_high,n\n");
+        let [x, y] = self.column_labels();
+        let mut columns = vec![("series", Vec::new()), (x, Vec::new()), (y, Vec::new())];
+        columns.extend(["low", "high", "x_low", "x_high", "n"].map(|name| (name, Vec::new())));
         let number = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
         let ends = |interval: Option<(f64, f64)>| match interval {
             Some((low, high)) => [number(low), number(high)],
@@ -215,17 +239,26 @@ impl Figure {
         for series in &self.series {
             for point in &series.points {
                 let x = match self.position_names() {
-                    Some(names) => names.get(point.x as usize).map_or("", String::as_str),
-                    None => &number(point.x),
+                    Some(names) => names.get(point.x as usize).cloned().unwrap_or_default(),
+                    None => number(point.x),
                 };
                 let [low, high] = ends(point.interval);
                 let [x_low, x_high] = ends(point.x_interval);
                 let n = point.n.map_or(String::new(), |n| n.to_string());
-                let name = csv_cell(&series.name);
-                let x = csv_cell(x);
-                let y = number(point.y);
-                text += &format!("{name},{x},{y},{low},{high},{x_low},{x_high},{n}\n");
+                let row = [series.name.clone(), x, number(point.y), low, high, x_low, x_high, n];
+                for ((_, cells), cell) in columns.iter_mut().zip(row) {
+                    cells.push(cell);
+                }
             }
+        }
+        let has_cells = |cells: &[String]| cells.iter().any(|cell| !cell.is_empty());
+        let first = columns.drain(..3).collect::<Vec<_>>();
+        columns.retain(|(_, cells)| has_cells(cells));
+        let columns = [first, columns].concat();
+        let line = |cells: Vec<String>| cells.join(",") + "\n";
+        let mut text = line(columns.iter().map(|(name, _)| csv_cell(name)).collect());
+        for row in 0..columns[0].1.len() {
+            text += &line(columns.iter().map(|(_, cells)| csv_cell(&cells[row])).collect());
         }
         text
     }
@@ -363,8 +396,8 @@ mod tests {
             series: vec![Series { name: "calm".into(), points }],
             ..Figure::default()
         };
-        let expected = "series,kind,\"hits, all\",low,high,x_low,x_high,n\n\
-                        calm,\"a \"\"wall\"\"\",1.5,1,2,,,4\ncalm,door,,,,,,\n";
+        let expected = "series,kind,\"hits, all\",low,high,n\n\
+                        calm,\"a \"\"wall\"\"\",1.5,1,2,4\ncalm,door,,,,\n";
         assert_eq!(figure.csv(), expected);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use crate::chart::error_bar;
 use crate::style::{FAINT_INK, INK};
 use crate::svg::{Anchor, Rect, Svg, SvgNumber, TextStyle};
 use crate::text::{self, Weight};
@@ -70,14 +71,24 @@ const CROSS: [(f64, f64); 12] = [
     (-0.4, -0.4),
 ];
 
+/// Draws the mark of a mean, a bar across: it hides no interval, however short that is.
+pub(crate) fn mean_mark(svg: &mut Svg, (x, y): (f64, f64), half_px: f64, color: &str) {
+    let attributes = format_args!(r#"class="mean" stroke="{color}" stroke-width="2.4""#);
+    svg.line((x - half_px, y), (x + half_px, y), attributes);
+}
+
 /// A color in SVG notation: borrowed where it is fixed, owned where it follows from a number.
 pub(crate) type SvgColor = Cow<'static, str>;
 
 /// The symbol before a legend's label.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum LegendSymbol {
+    /// Nothing: words about the entries that follow.
+    None,
     /// A piece of a line, perhaps with its marker, and its dashes as an attribute.
     Line { color: SvgColor, marker: Option<Marker>, dash: &'static str },
+    /// A mean with the bar of its interval.
+    Mean { color: SvgColor },
     /// A marker alone.
     Marker { color: SvgColor, marker: Marker },
     /// The dashes of a reference line.
@@ -90,6 +101,13 @@ pub(crate) enum LegendSymbol {
     Leader,
     /// The mark of a target.
     Target,
+}
+
+impl LegendSymbol {
+    /// Returns the room that it takes before its label.
+    fn room_px(&self, font_px: f64) -> f64 {
+        if *self == Self::None { 0.0 } else { 2.8 * font_px }
+    }
 }
 
 /// A line of a legend; entries without a label are left out.
@@ -120,7 +138,7 @@ impl Legend {
         let mut row = 0;
         let mut placed = Vec::new();
         for mut entry in entries.into_iter().filter(|entry| !entry.label.trim().is_empty()) {
-            let symbol_px = 2.8 * font_px;
+            let symbol_px = entry.symbol.room_px(font_px);
             entry.label =
                 text::shorten(&entry.label, font_px, Weight::Regular, room_px - symbol_px);
             let width = symbol_px + text::width(&entry.label, font_px, Weight::Regular);
@@ -137,7 +155,7 @@ impl Legend {
     /// Returns the width of a legend with one entry in each row.
     pub(crate) fn column_px(entries: &[LegendEntry], font_px: f64) -> f64 {
         let width = |entry: &LegendEntry| {
-            text::width(&entry.label, font_px, Weight::Regular) + 2.8 * font_px
+            text::width(&entry.label, font_px, Weight::Regular) + entry.symbol.room_px(font_px)
         };
         entries.iter().map(width).fold(0.0, f64::max)
     }
@@ -156,7 +174,10 @@ impl Legend {
         for (x, row, entry) in &self.placed {
             let middle = top + (*row as f64 + 0.5) * self.row_px();
             self.draw_symbol(svg, &entry.symbol, left + x, middle);
-            let text_x = left + x + 2.4 * self.font_px;
+            let text_x = match entry.symbol {
+                LegendSymbol::None => left + x,
+                _ => left + x + 2.4 * self.font_px,
+            };
             svg.text(text_x, middle + text_style.middle_px(), &entry.label, &text_style);
         }
     }
@@ -167,12 +188,18 @@ impl Legend {
         let center = (x + size, y);
         let end = (x + 2.0 * size, y);
         match symbol {
+            LegendSymbol::None => {}
             LegendSymbol::Line { color, marker, dash } => {
                 let attributes = format_args!(r#"stroke="{color}" stroke-width="2"{dash}"#);
                 svg.line((x, y), end, attributes);
                 if let Some(marker) = marker {
                     marker.draw(svg, center, 0.32 * size, color);
                 }
+            }
+            LegendSymbol::Mean { color } => {
+                let half_px = 0.62 * size;
+                error_bar(svg, center.0, (y - half_px, y + half_px), 0.26 * size, color);
+                mean_mark(svg, center, 0.4 * size, color);
             }
             LegendSymbol::Marker { color, marker } => marker.draw(svg, center, 0.32 * size, color),
             LegendSymbol::Dashes { color } => {

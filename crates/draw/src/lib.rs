@@ -58,6 +58,6 @@ pub use error::DrawError;
 pub use pdf::to_pdf;
 pub use picture::{PictureOptions, PictureView, TrailChoice, bodies_with_trails, describe, draw};
 pub use raster::{MAX_PNG_PX, to_png, to_png_with_density};
-pub use style::{Style, series_colors};
+pub use style::{SeriesLook, Style, series_colors};
 pub use text::Fonts;
 pub use theme::{DARK_COLORS, to_dark};

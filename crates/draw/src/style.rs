@@ -42,9 +42,28 @@ const DASHES: [&str; 4] = [
     r#" stroke-dasharray="7 3 2 3""#,
 ];
 
-/// Returns the dashes of the line of a series, which differ where colors repeat.
-pub(crate) fn series_dash(index: usize) -> &'static str {
-    DASHES[index / SERIES_COLOR_COUNT % DASHES.len()]
+/// The look of a series: numbers of its color, its marker, and the dashes of its line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SeriesLook {
+    /// Colors repeat after seven.
+    pub color: usize,
+    /// Markers repeat after five.
+    pub marker: usize,
+    /// Dashes repeat after four; the first ones are a whole line.
+    pub dash: usize,
+}
+
+impl SeriesLook {
+    /// Returns the look of the series with this number, where each has a color of its own; its dashes differ where colors
+    /// repeat.
+    pub fn of_series(index: usize) -> Self {
+        Self { color: index, marker: index, dash: index / SERIES_COLOR_COUNT }
+    }
+
+    /// Returns the attributes of the dashes of its line.
+    pub(crate) fn dash_attribute(self) -> &'static str {
+        DASHES[self.dash % DASHES.len()]
+    }
 }
 
 /// Returns the dashes of the trails of bodies with these numbers, which differ where colors repeat.

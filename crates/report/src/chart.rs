@@ -1,5 +1,6 @@
 //! Figures as SVG.
 
+use crate::series_looks::SeriesLooks;
 use sidestep_document::figure::{Point, Scale, SlotStats};
 use sidestep_document::{Figure, FigureKind, Series};
 use sidestep_draw::{
@@ -44,7 +45,9 @@ pub(crate) fn draw_chart(figure: &Figure, style: &Style) -> Result<DrawnChart, D
         FigureKind::Front { corners } => {
             plot(figure, Mark::Points).reference_path("front", corners.clone()).draw(style)
         }
-        FigureKind::Forest { rows, texts } => forest(figure, rows, texts).draw(style),
+        FigureKind::Forest { rows, texts, words } => {
+            forest(figure, rows, texts).words(&words.heading, &words.unmarked).draw(style)
+        }
         FigureKind::Runs { slots, is_joined, has_zero_line, has_bars, legend } => {
             let mut chart = SlotChart::new(
                 &figure.title,
@@ -123,18 +126,50 @@ fn axis(scale: Scale, label: &str) -> Axis {
 }
 
 fn plot(figure: &Figure, mark: Mark) -> Plot {
+    let mut x_axis = axis(figure.x_scale, &figure.x_label);
+    if mark == Mark::Line
+        && let Some(levels) = few_levels(&figure.series)
+    {
+        x_axis = x_axis.ticks(levels);
+    }
     let mut plot = Plot::new(&figure.title)
-        .x_axis(axis(figure.x_scale, &figure.x_label))
+        .x_axis(x_axis)
+        .interval_label(&figure.interval_words)
         .y_axis(axis(figure.y_scale, &figure.y_label))
         .note(&figure.note);
-    for series in &figure.series {
+    let SeriesLooks { heading, labels, looks } = SeriesLooks::new(&figure.series);
+    for (series, (label, mut look)) in figure.series.iter().zip(labels.into_iter().zip(looks)) {
+        // Steps of several series lie over each other where these begin and end.
+        if mark == Mark::Steps {
+            look.dash = look.color;
+        }
         plot = plot.series(sidestep_draw::Series {
-            label: series.name.clone(),
+            label,
             points: series.points.iter().map(point).collect(),
             mark,
+            look: Some(look),
         });
     }
-    plot
+    plot.legend_heading(heading)
+}
+
+/// Largest number of levels that all have a tick.
+const MAX_LEVEL_TICKS: usize = 7;
+
+/// Returns the places of points along the horizontal axis in rising order, if these are few levels of all series: a reader
+/// sees where was measured.
+fn few_levels(series: &[Series]) -> Option<Vec<f64>> {
+    let mut levels: Vec<f64> = Vec::new();
+    for x in series.iter().flat_map(|series| &series.points).map(|point| point.x) {
+        if !levels.contains(&x) {
+            levels.push(x);
+        }
+        if levels.len() > MAX_LEVEL_TICKS {
+            return None;
+        }
+    }
+    levels.sort_by(f64::total_cmp);
+    (levels.len() > 1).then_some(levels)
 }
 
 fn point(p: &Point) -> sidestep_draw::Point {

@@ -5,6 +5,7 @@ mod gallery;
 mod html;
 pub mod markdown;
 mod print;
+mod series_looks;
 
 pub use gallery::{Gallery, GalleryMark, GalleryMetric, GalleryRun, GalleryValue, gallery_page};
 pub use print::{FigureLook, PrintFigure, PrintStyle};

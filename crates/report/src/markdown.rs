@@ -11,7 +11,8 @@ use std::fmt::Write;
 /// Returns a document as text; `folder` holds the `pictures`, one for each figure and picture.
 pub(crate) fn text(document: &Document, folder: &str, pictures: &[SvgFile]) -> String {
     let mut parts = vec![format!("# {}", escaped(&document.title)), spans(&document.lead)];
-    parts.extend(document.replay.as_ref().map(|replay| format!("[{REPLAY_WORDS}]({replay})")));
+    let replay = document.replay_address();
+    parts.extend(replay.map(|replay| format!("[{REPLAY_WORDS}]({replay})")));
     let mut pictures = pictures.iter();
     for block in &document.blocks {
         parts.push(match block {

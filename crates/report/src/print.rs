@@ -3,7 +3,7 @@
 
 use crate::{SvgFile, chart, slug};
 use sidestep_document::document::Block;
-use sidestep_document::{Document, Figure};
+use sidestep_document::{Document, Figure, FigureKind};
 use sidestep_draw::{DrawError, DrawnChart, Style, to_dark};
 use std::collections::BTreeSet;
 
@@ -129,24 +129,69 @@ impl PrintStyle {
     /// Returns a figure without title and note, and with replaced labels.
     fn for_print(&self, figure: &Figure) -> Figure {
         let mut figure = Figure { title: String::new(), note: String::new(), ..figure.clone() };
-        self.replace_label(&mut figure.x_label);
-        self.replace_label(&mut figure.y_label);
+        // Without its note, the legend says what is shown.
+        let tells_intervals =
+            !matches!(figure.kind, FigureKind::Runs { .. } | FigureKind::Forest { .. });
+        if figure.has_intervals() && tells_intervals {
+            let runs = figure.runs_words().map(|words| format!(", {words}")).unwrap_or_default();
+            figure.interval_words = self.label(INTERVAL_WORDS) + &runs;
+        }
+        for label in [&mut figure.x_label, &mut figure.y_label] {
+            *label = self.label_or_words(label);
+        }
         for series in &mut figure.series {
-            self.replace_label(&mut series.name);
+            series.name = self.label_or_words(&series.name);
         }
         for name in figure.position_names_mut() {
-            self.replace_label(name);
+            *name = self.label_or_words(name);
         }
         for words in figure.legend_words_mut() {
-            self.replace_label(words);
+            *words = self.label(words);
         }
         figure
     }
 
-    fn replace_label(&self, label: &mut String) {
-        if let Some((_, to)) = self.labels.iter().find(|(from, _)| from == label) {
-            label.clone_from(to);
+    /// Returns the author's words for a label; the label itself where there are none.
+    fn label(&self, label: &str) -> String {
+        let own = self.labels.iter().find(|(from, _)| from == label);
+        own.map_or(label, |(_, to)| to).to_string()
+    }
+
+    /// Returns the author's words for a label, or else its own, where it is a key of the scenario.
+    fn label_or_words(&self, label: &str) -> String {
+        let own = self.label(label);
+        if own == label { key_words(label) } else { own }
+    }
+}
+
+/// What the legend says of means.
+const INTERVAL_WORDS: &str = "mean, 95 % interval";
+
+/// Returns the words of a key, as `robots.0.count` is the number of robots, and those of levels of factors; other labels
+/// stay.
+fn key_words(label: &str) -> String {
+    let (key, unit) = match label.split_once(" (") {
+        Some((key, unit)) => (key, format!(" ({unit}")),
+        None => (label, String::new()),
+    };
+    if !key.contains([' ', '=']) && key.starts_with(char::is_alphabetic) {
+        return words_of_key(key) + &unit;
+    }
+    let word = |part: &str| match part.split_once('=') {
+        Some((key, value)) => {
+            format!("{}={}", words_of_key(key.trim()), value.trim().replace('_', " "))
         }
+        None => part.to_string(),
+    };
+    label.split(", ").map(word).collect::<Vec<_>>().join(", ")
+}
+
+fn words_of_key(key: &str) -> String {
+    let parts: Vec<&str> = key.split('.').filter(|part| part.parse::<usize>().is_err()).collect();
+    match parts[..] {
+        [.., things, "count"] => format!("number of {}", things.replace('_', " ")),
+        [.., last] => last.replace('_', " "),
+        [] => key.to_string(),
     }
 }
 
@@ -187,7 +232,11 @@ mod tests {
 
     #[test]
     fn a_figure_for_print_has_its_size_and_words_and_no_title() {
-        let points = vec![Point::new(0.0, 1.0), Point::new(1.0, 2.0)];
+        let bar = Some((0.5, 1.5));
+        let points = vec![
+            Point::new(0.0, 1.0).with_interval(bar).with_runs(8),
+            Point::new(1.0, 2.0).with_runs(8),
+        ];
         let figure = Figure {
             title: "The title".into(),
             note: "The note".into(),
@@ -212,8 +261,27 @@ mod tests {
             ("01-the-title", vec!["missing"])
         );
         assert!(printed[0].csv.starts_with("series,gap (m),Number of hits,low"));
+        assert!(svg.contains(">mean, 95 % interval, n = 8<"), "{svg}");
         let dark = PrintStyle { look: FigureLook::Dark, ..print };
         let svg = &dark.figures(&document, 0).unwrap()[0].file.svg;
         assert!(svg.contains(r#"width="481""#) && !svg.contains("#FFFFFF"), "{svg}");
+    }
+
+    #[test]
+    fn keys_and_levels_are_told_in_words_and_other_labels_stay() {
+        let told = [
+            ("robots.0.count", "number of robots"),
+            ("airspace.method", "method"),
+            ("ground.corridor.width (m)", "width (m)"),
+            ("conflict_policy = right_of_way", "conflict policy=right of way"),
+            ("count=6, conflict_policy=random", "count=6, conflict policy=random"),
+            ("closest approach (m)", "closest approach (m)"),
+            ("0.5", "0.5"),
+            ("1.5x", "1.5x"),
+            ("", ""),
+        ];
+        for (label, words) in told {
+            assert_eq!(key_words(label), words);
+        }
     }
 }

@@ -49,7 +49,11 @@ fn all_figure_kinds() -> Vec<Figure> {
         FigureKind::Bars { categories: categories.clone() },
         FigureKind::Dots { categories: categories.clone() },
         FigureKind::Steps,
-        FigureKind::Forest { rows: categories.clone(), texts: vec![categories.clone()] },
+        FigureKind::Forest {
+            rows: categories.clone(),
+            texts: vec![categories.clone()],
+            words: Default::default(),
+        },
         FigureKind::Runs {
             slots: vec![SlotStats { mean: Some(2.0), ..SlotStats::default() }],
             is_joined: false,

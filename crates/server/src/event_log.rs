@@ -167,7 +167,7 @@ fn pack(entries: &[LogEvent]) -> Box<[u8]> {
 mod tests {
     use super::*;
     use sidestep::worlds::robots::kinds::{PERSON, ROBOT};
-    use sidestep_kernel::view::{BodyId, LogEventKind, Quantity, Severity, Vec3};
+    use sidestep_kernel::view::{BodyId, LogEventKind, Quantity, Severity};
 
     fn happened(cycle: Cycle) -> LogEvent {
         LogEvent {
@@ -176,7 +176,7 @@ mod tests {
             kind: LogEventKind::Contact,
             who: BodyId::new(ROBOT, cycle as u32 % 7, None),
             with: (cycle % 3 == 0).then(|| BodyId::new(PERSON, 2, Some(1))),
-            at_m: Some(Vec3 { x: cycle as f64, y: f64::MIN_POSITIVE, z: -0.0 }),
+            at_m: Some([cycle as f64, f64::MIN_POSITIVE, -0.0]),
             value: Some(Quantity::new(0.1 * cycle as f64, "m")),
             words: format!("touches a wall in cycle {cycle}"),
         }

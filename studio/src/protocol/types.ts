@@ -1187,6 +1187,23 @@ cycles: Array<number>,
 points_m: Array<number>, };
 
 /**
+ * A result of a run that is far from those of the other runs of its variant.
+ */
+export type SweepOutlier = {
+/**
+ * The place of its column.
+ */
+column: number,
+/**
+ * Whether it is above the others.
+ */
+is_high: boolean,
+/**
+ * Its distance from the nearer quartile in interquartile ranges; null where the quartiles are equal.
+ */
+distance_ranges: number | null, };
+
+/**
  * A run of a sweep.
  */
 export type SweepRun = {
@@ -1214,23 +1231,6 @@ values: Array<number | null>,
  * The results that are far from those of the other runs of its variant.
  */
 outliers: Array<SweepOutlier>, };
-
-/**
- * A result of a run that is far from those of the other runs of its variant.
- */
-export type SweepOutlier = {
-/**
- * The place of its column.
- */
-column: number,
-/**
- * Whether it is above the others.
- */
-is_high: boolean,
-/**
- * Its distance from the nearer quartile in interquartile ranges; null where the quartiles are equal.
- */
-distance_ranges: number | null, };
 
 /**
  * A result of the runs of a sweep.

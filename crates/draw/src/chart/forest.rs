@@ -5,7 +5,7 @@ use crate::chart::frame::{ChartFrame, FrameText, MAX_TICK_LABEL_FRACTION, XAxis,
 use crate::chart::{DrawnChart, level_error_bar};
 use crate::error::DrawError;
 use crate::legend::{LegendEntry, LegendSymbol, Marker};
-use crate::style::{GROUND, INK, Style, series_color};
+use crate::style::{FAINT_INK, GROUND, INK, Style, series_color};
 use crate::svg::{Anchor, TextStyle};
 use crate::text::{self, Weight};
 
@@ -16,12 +16,12 @@ const TEXT_LINE: f64 = 1.2;
 /// Gap between the area and the text beside it.
 const TEXT_GAP_PX: f64 = 10.0;
 /// Radius of a mark as a multiple of the size of small text.
-const MARK_FRACTION: f64 = 0.42;
+const MARK_FRACTION: f64 = 0.34;
 /// An end of an interval farther from zero than this multiple of the third quartile of all ends is cut off, with an
 /// arrow: one large effect would press all others against zero.
 const MAX_SPREAD: f64 = 3.0;
-/// Reach of the axis beyond the largest effects.
-const MARGIN: f64 = 1.04;
+/// Reach of the axis beyond the outermost effects as a fraction of its length, so that no mark sits on the frame.
+const MARGIN_FRACTION: f64 = 0.05;
 /// Largest fraction of the width for the names of rows and the text together; text that needs more is broken, and left
 /// out only where a word alone needs more.
 const MAX_WORDS_FRACTION: f64 = 0.68;
@@ -54,6 +54,10 @@ pub struct ForestChart {
     x: Axis,
     rows: Vec<String>,
     series: Vec<ForestSeries>,
+    /// The head of the text on the right.
+    heading: String,
+    /// Why an effect has text and no mark.
+    unmarked: String,
 }
 
 impl ForestChart {
@@ -69,7 +73,17 @@ impl ForestChart {
             x,
             rows: rows.into_iter().map(Into::into).collect(),
             series: vec![],
+            heading: String::new(),
+            unmarked: String::new(),
         }
+    }
+
+    /// Sets the head of the text on the right, and why an effect has only its text.
+    #[must_use]
+    pub fn words(mut self, heading: impl Into<String>, unmarked: impl Into<String>) -> Self {
+        self.heading = heading.into();
+        self.unmarked = unmarked.into();
+        self
     }
 
     /// Adds a series.
@@ -97,12 +111,19 @@ impl ForestChart {
             DrawError::length("effects of a series", self.rows.len(), series.marks.len())?;
         }
         let limit = self.limit();
-        // A little more, so that no mark sits on the frame.
-        let shown = self.ends().map(|end| MARGIN * end.clamp(-limit, limit));
+        let shown = self.ends().map(|end| end.clamp(-limit, limit));
         let beside = self.beside(style);
-        // The axis has less room than that of other charts.
+        // The axis has less room than that of other charts, so that it does not end at round numbers.
         let across = max_ticks(&Style { width_px: 0.55 * style.width_px, ..*style }).0;
-        let x = self.x.fit(shown.chain([0.0]), across)?;
+        let (low, high) =
+            shown.fold((0.0, 0.0), |(low, high): (f64, f64), end| (low.min(end), high.max(end)));
+        let axis = if low < high {
+            let margin = MARGIN_FRACTION * (high - low);
+            self.x.clone().range(low - margin, high + margin)
+        } else {
+            self.x.clone()
+        };
+        let x = axis.fit(std::iter::once(0.0), across)?;
         let words = FrameText {
             title: &self.title,
             note: &self.note,
@@ -124,10 +145,24 @@ impl ForestChart {
             (zero, area.bottom()),
             format_args!(r#"stroke="{INK}" stroke-width="1.2""#),
         );
+        self.draw_heading(&mut frame, style, &beside);
         for index in 0..self.series.len() {
             self.draw_series(&mut frame, x_scale, index, (style, &beside));
         }
         Ok(frame.finish())
+    }
+
+    /// Writes the head of the text, where it is not wider than the text.
+    fn draw_heading(&self, frame: &mut ChartFrame, style: &Style, beside: &EffectText) {
+        let size = style.small_px();
+        let width_px = text::width(&self.heading, size, Weight::Regular) + TEXT_GAP_PX;
+        let text_style = TextStyle { fill: FAINT_INK, ..TextStyle::new(size, Anchor::Start) };
+        // It may extend over the last part of the area, above which nothing is.
+        let end = frame.area.right() + beside.width_px;
+        if beside.width_px > 0.0 && width_px < beside.width_px + 0.5 * frame.area.width {
+            let x = (frame.area.right() + TEXT_GAP_PX).min(end - width_px + TEXT_GAP_PX);
+            frame.svg.text(x, frame.area.y - 3.0, &self.heading, &text_style);
+        }
     }
 
     /// Returns the height of a row: names of quantities may take two lines, and each effect some of text.
@@ -166,13 +201,17 @@ impl ForestChart {
         let max_name = MAX_TICK_LABEL_FRACTION * style.width_px;
         let names = self.rows.iter().map(|row| width(row)).fold(0.0, f64::max).min(max_name);
         let room = MAX_WORDS_FRACTION * style.width_px - names;
+        let is_broken = self.marks().any(|mark| width(&mark.text) > room);
         let mut lines = Vec::with_capacity(self.series.len());
         for series in &self.series {
-            let of_mark = |mark: &ForestMark| {
-                if width(&mark.text) <= room {
-                    return vec![mark.text.clone()];
-                }
-                text::wrap(&bound_words(&mark.text), size, Weight::Regular, room)
+            let of_mark = |mark: &ForestMark| match mark.text.rsplit_once(", ") {
+                _ if !is_broken => vec![mark.text.clone()],
+                // All are broken at the same place, or lines of two effects run together.
+                Some((effect, p)) => [format!("{effect},"), p.to_string()]
+                    .iter()
+                    .flat_map(|part| text::wrap(&bound_words(part), size, Weight::Regular, room))
+                    .collect(),
+                None => text::wrap(&bound_words(&mark.text), size, Weight::Regular, room),
             };
             lines.push(series.marks.iter().map(of_mark).collect::<Vec<_>>());
         }
@@ -225,6 +264,15 @@ impl ForestChart {
                 place.draw(frame, mark, Marker::of_series(index), &color);
                 let at = x.px(mark.value).clamp(frame.area.x, frame.area.right());
                 frame.push_spot((at, y), index, row);
+            } else if !self.unmarked.is_empty() && !mark.text.is_empty() {
+                let faint = TextStyle { fill: FAINT_INK, ..text_style.clone() };
+                let words = text::shorten(
+                    &self.unmarked,
+                    size,
+                    Weight::Regular,
+                    frame.area.right() - x.px(0.0) - size,
+                );
+                frame.svg.text(x.px(0.0) + 0.6 * size, y + faint.middle_px(), &words, &faint);
             }
         }
     }

@@ -7,7 +7,7 @@ use crate::error::DrawError;
 use crate::legend::{
     LegendEntry, LegendSymbol, Marker, arrowhead, reference_line_attributes, start_mark,
 };
-use crate::style::{FAINT_INK, Style, series_color, series_dash};
+use crate::style::{FAINT_INK, SeriesLook, Style, series_color};
 use crate::svg::{Rect, Svg};
 use sidestep_kernel::math::hypot;
 
@@ -15,6 +15,10 @@ use sidestep_kernel::math::hypot;
 const MIN_POINT_DISTANCE_PX: f64 = 0.5;
 /// Straight pieces of an ideal line, which is a curve if one axis is logarithmic.
 const IDEAL_LINE_SEGMENTS: u32 = 64;
+/// Opacity of bands: two of them over each other are still told apart.
+const BAND_OPACITY: f64 = 0.2;
+/// Radius of a marker as a multiple of the size of text: intervals of some percent are still longer.
+const MARKER_FRACTION: f64 = 0.27;
 /// Longest series with a marker at each point; longer ones show only their line.
 const MAX_MARKERS: usize = 60;
 
@@ -61,7 +65,7 @@ pub enum Mark {
     Steps,
 }
 
-/// Points that belong together; color and marker follow from the series' number.
+/// Points that belong together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Label in the legend; an empty label has no place there.
@@ -70,12 +74,14 @@ pub struct Series {
     pub points: Vec<Point>,
     /// Line or points.
     pub mark: Mark,
+    /// Color, marker and dashes; without them they follow from the series' number.
+    pub look: Option<SeriesLook>,
 }
 
 impl Series {
     /// Returns points joined by a line in their order, with markers if they are few.
     pub fn line(label: impl Into<String>, points: Vec<Point>) -> Self {
-        Self { label: label.into(), points, mark: Mark::Line }
+        Self { label: label.into(), points, mark: Mark::Line, look: None }
     }
 
     /// Returns points joined by a line, their intervals as a band around it.
@@ -116,6 +122,8 @@ pub struct Plot {
     x: Axis,
     y: Axis,
     series: Vec<Series>,
+    legend_heading: String,
+    interval_label: String,
     ideals: Vec<IdealLine>,
     references: Vec<ReferencePath>,
 }
@@ -136,6 +144,8 @@ impl Plot {
             x: Axis::linear("x"),
             y: Axis::linear("y"),
             series: vec![],
+            legend_heading: String::new(),
+            interval_label: String::new(),
             ideals: vec![],
             references: vec![],
         }
@@ -155,11 +165,29 @@ impl Plot {
         self
     }
 
-    /// Adds a series; its number among them decides color and marker.
+    /// Adds a series.
     #[must_use]
     pub fn series(mut self, series: Series) -> Self {
         self.series.push(series);
         self
+    }
+
+    /// Sets the words before the legend, such as the factors whose levels are the labels.
+    #[must_use]
+    pub fn legend_heading(mut self, heading: impl Into<String>) -> Self {
+        self.legend_heading = heading.into();
+        self
+    }
+
+    /// Sets what the legend says of the intervals; empty words have no place there.
+    #[must_use]
+    pub fn interval_label(mut self, label: impl Into<String>) -> Self {
+        self.interval_label = label.into();
+        self
+    }
+
+    fn look(&self, index: usize) -> SeriesLook {
+        self.series[index].look.unwrap_or_else(|| SeriesLook::of_series(index))
     }
 
     /// Adds the dashed line `y = intercept + slope * x` behind the data: slope 1 for the ideal
@@ -228,7 +256,14 @@ impl Plot {
             frame.svg.path(&data, reference_line_attributes(FAINT_INK));
         }
         for index in 0..self.series.len() {
-            self.draw_series(&mut frame, x_scale, index, style);
+            self.draw_lines(&mut frame, x_scale, index, style);
+        }
+        // Bars over all lines, and markers over all bars: no marker of another series hides a line's end.
+        for index in 0..self.series.len() {
+            self.draw_intervals(&mut frame, x_scale, index, style);
+        }
+        for index in 0..self.series.len() {
+            self.draw_markers(&mut frame, x_scale, index, style);
         }
         frame.svg.close_group();
         Ok(frame.finish())
@@ -245,13 +280,14 @@ impl Plot {
     /// Returns one entry per series and ideal line.
     fn legend(&self) -> Vec<LegendEntry> {
         let series = self.series.iter().enumerate().map(|(index, series)| {
-            let color = series_color(index).into();
-            let marker = Marker::of_series(index);
+            let look = self.look(index);
+            let color = series_color(look.color).into();
+            let marker = Marker::of_series(look.marker);
             let symbol = match series.mark {
                 Mark::Points => LegendSymbol::Marker { color, marker },
                 Mark::Line | Mark::Band | Mark::Path | Mark::Steps => {
                     let marker = series.shows_markers().then_some(marker);
-                    LegendSymbol::Line { color, marker, dash: series_dash(index) }
+                    LegendSymbol::Line { color, marker, dash: look.dash_attribute() }
                 }
             };
             LegendEntry::new(symbol, &series.label)
@@ -261,42 +297,60 @@ impl Plot {
         let dashes = ideals
             .chain(references)
             .map(|label| LegendEntry::new(LegendSymbol::Dashes { color: FAINT_INK }, label));
-        series.chain(dashes).collect()
+        let heading = LegendEntry::new(LegendSymbol::None, &self.legend_heading);
+        let are_bands = self.series.iter().any(|series| series.mark == Mark::Band);
+        let intervals = if are_bands {
+            let fill = FAINT_INK.into();
+            LegendSymbol::Swatch { fill, rim: "none".into(), opacity: BAND_OPACITY }
+        } else {
+            LegendSymbol::Mean { color: FAINT_INK.into() }
+        };
+        let intervals = LegendEntry::new(intervals, &self.interval_label);
+        std::iter::once(heading).chain(series).chain(dashes).chain([intervals]).collect()
     }
 
-    fn draw_series(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
+    fn draw_lines(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
         let series = &self.series[index];
-        let color = &series_color(index);
-        let y = frame.y;
         if series.mark == Mark::Band {
-            self.draw_band(frame, x, color, series);
+            self.draw_band(frame, x, &series_color(self.look(index).color), series);
         }
         if series.mark != Mark::Points {
             self.draw_line(frame, x, index, style);
         }
+    }
+
+    /// Draws the intervals of a series as bars.
+    fn draw_intervals(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
+        let series = &self.series[index];
+        let color = &series_color(self.look(index).color);
+        let y = frame.y;
+        let cap_px = 0.3 * style.font_px;
+        for point in series.points.iter().filter(|point| self.contains(point)) {
+            let at = (x.px(point.x), y.px(point.y));
+            if let Some((low, high)) =
+                point.x_interval.filter(|(l, h)| l.is_finite() && h.is_finite())
+            {
+                level_error_bar(&mut frame.svg, at.1, (x.px(low), x.px(high)), cap_px, color);
+            }
+            if let Some((low, high)) = bounds(point).filter(|_| series.mark != Mark::Band) {
+                error_bar(&mut frame.svg, at.0, (y.px(low), y.px(high)), cap_px, color);
+            }
+        }
+    }
+
+    fn draw_markers(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
+        let series = &self.series[index];
+        let look = self.look(index);
+        let color = &series_color(look.color);
+        let marker = Marker::of_series(look.marker);
         for (number, point) in series.points.iter().enumerate() {
             if !self.contains(point) {
                 continue;
             }
-            let at = (x.px(point.x), y.px(point.y));
+            let at = (x.px(point.x), frame.y.px(point.y));
             frame.push_spot(at, index, number);
-            if let Some((low, high)) =
-                point.x_interval.filter(|(l, h)| l.is_finite() && h.is_finite())
-            {
-                let ends = (x.px(low), x.px(high));
-                level_error_bar(&mut frame.svg, at.1, ends, 0.3 * style.font_px, color);
-            }
-            if let Some((low, high)) = bounds(point).filter(|_| series.mark != Mark::Band) {
-                error_bar(
-                    &mut frame.svg,
-                    at.0,
-                    (y.px(low), y.px(high)),
-                    0.3 * style.font_px,
-                    color,
-                );
-            }
             if series.shows_markers() {
-                Marker::of_series(index).draw(&mut frame.svg, at, 0.32 * style.font_px, color);
+                marker.draw(&mut frame.svg, at, MARKER_FRACTION * style.font_px, color);
             }
         }
     }
@@ -304,8 +358,9 @@ impl Plot {
     /// Draws the line of a series, interrupted at points that have no place on the axes.
     fn draw_line(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {
         let series = &self.series[index];
-        let color = &series_color(index);
-        let dash = series_dash(index);
+        let look = self.look(index);
+        let color = &series_color(look.color);
+        let dash = look.dash_attribute();
         let y = frame.y;
         for run in
             series.points.split(|p| !self.contains(p)).filter(|run| has_line(series.mark, run))
@@ -316,7 +371,10 @@ impl Plot {
             } else {
                 polyline(decimate(places.iter().copied()))
             };
-            let attributes = r#"fill="none" stroke-width="2" stroke-linejoin="round""#;
+            // Steps of several series lie side by side.
+            let width_px = if series.mark == Mark::Steps { 1.6 } else { 2.0 };
+            let attributes =
+                format!(r#"fill="none" stroke-width="{width_px}" stroke-linejoin="round""#);
             frame.svg.path(&data, format_args!(r#"stroke="{color}" {attributes}{dash}"#));
             if series.mark == Mark::Path {
                 draw_ends(&mut frame.svg, &places, color, 0.7 * style.font_px);
@@ -332,7 +390,7 @@ impl Plot {
             let upper = run.iter().map(|p| (x.px(p.x), y.px(ends(p).1)));
             let lower = run.iter().rev().map(|p| (x.px(p.x), y.px(ends(p).0)));
             let data = polyline(upper.chain(lower)) + "Z";
-            frame.svg.path(&data, format_args!(r#"fill="{color}" fill-opacity="0.2""#));
+            frame.svg.path(&data, format_args!(r#"fill="{color}" fill-opacity="{BAND_OPACITY}""#));
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::axis::Axis;
 use crate::chart::frame::{ChartFrame, FrameText, XAxis, max_ticks, polyline};
 use crate::chart::{DrawnChart, error_bar};
 use crate::error::DrawError;
-use crate::legend::{LegendEntry, LegendSymbol, Marker};
+use crate::legend::{LegendEntry, LegendSymbol, mean_mark};
 use crate::style::{FAINT_INK, INK, Style, reference_line, series_color};
 use crate::svg::Rect;
 
@@ -168,7 +168,7 @@ impl SlotChart {
             entries.push(LegendEntry::new(symbol, &self.seed_label));
         }
         if self.slots.iter().any(|slot| slot.mean.is_some()) {
-            let symbol = LegendSymbol::Marker { color: INK.into(), marker: Marker::Diamond };
+            let symbol = LegendSymbol::Mean { color: INK.into() };
             entries.push(LegendEntry::new(symbol, &self.mean_label));
         }
         entries
@@ -291,7 +291,7 @@ impl SlotPlace {
             error_bar(&mut frame.svg, x, ends, 1.1 * self.radius, INK);
         }
         let y = frame.y.px(mean);
-        Marker::Diamond.draw(&mut frame.svg, (x, y), 1.25 * self.radius, INK);
+        mean_mark(&mut frame.svg, (x, y), 1.7 * self.radius, INK);
     }
 }
 

@@ -204,7 +204,10 @@ impl Guess {
         }
         // Keys beside it may have nothing to do.
         let table = &self.key[..self.key.len().saturating_sub(1)];
-        if error.cause().contains("does nothing") && key.starts_with(table) {
+        let is_about_others = error.cause().contains("does nothing")
+            // Rows have as many entries as a list beside them has names.
+            || error.cause().contains(" entries, not ");
+        if is_about_others && key.starts_with(table) {
             return true;
         }
         // Names of its own key are in the error anyway, and numbers of elements are no names.
@@ -303,5 +306,9 @@ mod tests {
         assert!(!other.may_lead_to(&error("robots.1", "no place is free")));
         assert!(other.may_lead_to(&error("people.0", "no place beside a size of 2")));
         assert!(!other.may_lead_to(&error("people.0.size", "size = 0")));
+        let list = repair("sensors.eye.seen", RepairKind::Replace("[\"nothing\"]".into()));
+        let row = "row `wall` has 3 entries, not 1";
+        assert!(list.may_lead_to(&error("sensors.eye.confusion.wall", row)));
+        assert!(!list.may_lead_to(&error("sensors.ear.confusion.wall", row)));
     }
 }

@@ -355,7 +355,7 @@ fn distribution_figure(groups: &RunGroups<'_>, metric: &RunColumn) -> Option<Fig
         title: format!("Distribution of {label} over runs"),
         note: format!("95 % intervals, n = {n}."),
         x_label: label.to_string(),
-        y_label: "share of runs up to it".into(),
+        y_label: "cumulative share of runs".into(),
         kind: FigureKind::Steps,
         series: vec![Series { name: String::new(), points }],
         ..Figure::default()

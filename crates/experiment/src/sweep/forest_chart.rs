@@ -6,7 +6,7 @@ use super::label::capitalized;
 use super::run_charts::{VariantNames, baseline_name};
 use super::summary::{MetricSummary, MetricValues};
 use super::text::difference;
-use sidestep_document::figure::Point;
+use sidestep_document::figure::{ForestWords, Point};
 use sidestep_document::{Figure, FigureKind, Series};
 
 /// Largest number of variants that each metric has a mark of; of more, a figure shows one metric.
@@ -48,7 +48,8 @@ fn metrics_forest(
         let mut points = Vec::with_capacity(metrics.len());
         for (row, metric) in metrics.iter().enumerate() {
             let effect = unit.effect(metric, &metric.comparisons[k]);
-            points.extend(effect.map(|effect| effect.point(row)));
+            let pairs = metric.comparisons[k].pairs;
+            points.extend(effect.map(|effect| effect.point(row).with_runs(pairs)));
         }
         texts.push(metrics.iter().map(|metric| difference_text(&metric.comparisons[k])).collect());
         series.push(Series { name: names.names[*variant].clone(), points });
@@ -64,6 +65,7 @@ fn metrics_forest(
         kind: FigureKind::Forest {
             rows: metrics.iter().map(|metric| capitalized(&metric.label)).collect(),
             texts,
+            words: ForestWords { heading: heading(metrics), unmarked: unit.unmarked(baseline) },
         },
         series,
         ..Figure::default()
@@ -84,7 +86,8 @@ fn variants_forest(
     for (row, comparison) in metric.comparisons.iter().enumerate() {
         let interval = comparison.interval.map(|i| (i.low, i.high));
         let value = comparison.difference;
-        points.extend(value.map(|y| Point::new(row as f64, y).with_interval(interval)));
+        let point = value.map(|y| Point::new(row as f64, y).with_interval(interval));
+        points.extend(point.map(|point| point.with_runs(comparison.pairs)));
     }
     Some(Figure {
         title: format!("{}: all variants against {baseline}", capitalized(&metric.label)),
@@ -93,6 +96,10 @@ fn variants_forest(
         kind: FigureKind::Forest {
             rows: compared.iter().map(|v| names.names[*v].clone()).collect(),
             texts: vec![metric.comparisons.iter().map(difference_text).collect()],
+            words: ForestWords {
+                heading: heading(std::slice::from_ref(metric)),
+                unmarked: String::new(),
+            },
         },
         series: vec![Series { name: String::new(), points }],
         ..Figure::default()
@@ -117,17 +124,23 @@ fn p_text(p: f64) -> String {
     }
 }
 
+fn has_p(metrics: &[MetricSummary]) -> bool {
+    metrics.iter().flat_map(|metric| &metric.comparisons).any(|one| one.p_holm.is_some())
+}
+
+/// Returns the head of the differences in words.
+fn heading(metrics: &[MetricSummary]) -> String {
+    let p = if has_p(metrics) { ", p (Holm)" } else { "" };
+    format!("difference [95 % interval]{p}")
+}
+
 fn note(metrics: &[MetricSummary], remark: &str) -> String {
     let comparisons = metrics.iter().flat_map(|metric| &metric.comparisons);
     let pairs = comparisons.clone().map(|comparison| comparison.pairs);
     let min = pairs.clone().min().unwrap_or(0);
     let max = pairs.max().unwrap_or(0);
     let count = if min == max { max.to_string() } else { format!("{min} to {max}") };
-    let holm = if comparisons.clone().any(|comparison| comparison.p_holm.is_some()) {
-        " and p, adjusted by Holm"
-    } else {
-        ""
-    };
+    let holm = if has_p(metrics) { " and p, adjusted by Holm" } else { "" };
     let text = format!(
         "Mean differences on the same seeds with 95 % intervals, {count} pairs; hollow where the interval has zero in \
          it. On the right in the unit of the metric{holm}. An arrow: it lies beyond the axis. {remark}"
@@ -180,6 +193,14 @@ impl EffectUnit {
         match self {
             Self::Percent => "Without a mark: the baseline's mean is 0 or too near to it.",
             Self::StandardDeviations => "Without a mark: all runs of the baseline are equal.",
+        }
+    }
+
+    /// Returns why an effect has no mark.
+    fn unmarked(self, baseline: &str) -> String {
+        match self {
+            Self::Percent => format!("mean of {baseline} near 0"),
+            Self::StandardDeviations => format!("runs of {baseline} equal"),
         }
     }
 

@@ -218,7 +218,7 @@ pub(super) fn shares_up_to(groups: &RunGroups<'_>, metric: &RunColumn) -> Option
         title: format!("Distribution of {label}"),
         note: "A curve further to the right has greater values; a steep one varies little from seed to seed.".into(),
         x_label: label.to_string(),
-        y_label: "share of runs up to it".into(),
+        y_label: "cumulative share of runs".into(),
         kind: FigureKind::Steps,
         series,
         ..Figure::default()

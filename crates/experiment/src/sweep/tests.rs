@@ -313,7 +313,7 @@ fn the_first_page_has_the_comparison_against_zero_and_at_most_six_figures() {
     let summary = against_the_calmest(&grid());
     let lead = summary.lead_figures();
     assert!((2..=6).contains(&lead.len()), "{} figures", lead.len());
-    let FigureKind::Forest { rows, texts } = &lead[0].kind else { panic!("a forest first") };
+    let FigureKind::Forest { rows, texts, .. } = &lead[0].kind else { panic!("a forest first") };
     let compared = lead[0].series.len();
     assert!(texts.len() == compared && texts.iter().all(|texts| texts.len() == rows.len()));
     assert!(lead[0].x_label.starts_with("difference from "), "{}", lead[0].x_label);

@@ -103,7 +103,8 @@ impl ColumnEncoder {
             levels.extend(&vec![1; range.len()]);
             return self.encoder.extend(values, range);
         };
-        let flags: Vec<u32> = valid[range.clone()].iter().map(|&is_valid| is_valid.into()).collect();
+        let flags: Vec<u32> =
+            valid[range.clone()].iter().map(|&is_valid| is_valid.into()).collect();
         levels.extend(&flags);
         let present: Vec<usize> = range.filter(|&row| valid[row]).collect();
         self.encoder.extend(&values.gather_rows(&present), 0..present.len());

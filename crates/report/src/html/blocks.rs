@@ -14,10 +14,12 @@ pub(super) fn markup(page_block: &PageBlock<'_>) -> Markup {
         Block::Warning(warning) => html! { p .warning role="note" { (text(warning)) } },
         Block::Code(block) => code(block),
         Block::Facts(list) => facts(list),
-        Block::Table(table) => tables::table(table, &page_block.id, page_block.replay),
+        Block::Table(table) => tables::table(table, &page_block.id, page_block.replay.as_deref()),
         Block::Claims(claims) => tables::claims(claims),
         Block::Figure(figure) => figures::figure(figure, &page_block.id, page_block.picture),
-        Block::Picture(picture) => figures::picture(picture, &page_block.id, page_block.replay),
+        Block::Picture(picture) => {
+            figures::picture(picture, &page_block.id, page_block.replay.as_deref())
+        }
     }
 }
 

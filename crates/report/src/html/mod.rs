@@ -59,7 +59,7 @@ pub(crate) fn page(document: &Document, pictures: &[PagePicture]) -> String {
                 header {
                     h1 { (document.title) }
                     p .lead { (text(&document.lead)) }
-                    @if let Some(replay) = &document.replay { p { a href=(replay) { (REPLAY_WORDS) } } }
+                    @if let Some(replay) = document.replay_address() { p { a href=(replay) { (REPLAY_WORDS) } } }
                 }
                 @if has_contents { (table_of_contents(&sections)) }
                 main { @for section in &sections { (section.markup()) } }
@@ -88,8 +88,8 @@ struct PageBlock<'a> {
     block: &'a Block,
     id: String,
     picture: Option<&'a PagePicture>,
-    /// The path of the replay beside the report.
-    replay: Option<&'a str>,
+    /// The address of the replay beside the report.
+    replay: Option<String>,
 }
 
 impl<'a> PageSection<'a> {
@@ -107,7 +107,7 @@ impl<'a> PageSection<'a> {
             let picture = if has_picture { pictures.next() } else { None };
             let id = anchor_id(title_of(block).unwrap_or("part"), k);
             if let Some(section) = sections.last_mut() {
-                let replay = document.replay.as_deref();
+                let replay = document.replay_address();
                 section.blocks.push(PageBlock { block, id, picture, replay });
             }
         }

@@ -1,8 +1,8 @@
 //! Views of the kernel as types of the protocol.
 
 use crate::protocol::{
-    Appearance, BodyId, BodyName, EarthChart, OccupancyGrid, Problem, RunEvent, Scan, Scene, SceneGroup,
-    Shape, StaticBody, Traffic, TrafficArea, TrafficRoute,
+    Appearance, BodyId, BodyName, EarthChart, OccupancyGrid, Problem, RunEvent, Scan, Scene,
+    SceneGroup, Shape, StaticBody, Traffic, TrafficArea, TrafficRoute,
 };
 use sidestep_kernel::InputError;
 use sidestep_kernel::view::{

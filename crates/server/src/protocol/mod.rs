@@ -53,8 +53,8 @@ pub use request::{
     BodyId, ClientRequest, OpenTarget, RunMethod, ServerMethod, SessionMethod, Speed,
 };
 pub use scene::{
-    Appearance, BodyName, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, SceneGroup, Shape,
-    StaticBody,
+    Appearance, BodyName, BodyTable, FrameText, OccupancyGrid, RunEvent, Scan, Scene, SceneGroup,
+    Shape, StaticBody,
 };
 pub use traffic::{BodyTrail, EarthChart, Traffic, TrafficArea, TrafficRoute};
 

@@ -245,3 +245,19 @@ fn what_a_draft_was_given_is_never_told() {
     let source = Source::new("c.toml", text, "");
     assert_eq!(reported_problems(&source), ["chains.at_m", "chains.tasks.targets_m"]);
 }
+
+#[test]
+fn a_door_that_a_sensor_cannot_tell_is_one_problem_with_a_remedy_that_works() {
+    let text = "format = 1\nworld = \"robots\"\ncycles = 10\n[map]\nascii = \"\"\"\n......\n......\n\"\"\"\n\
+                [sensors.eye]\nobservations = [\"nothing\", \"wall\", \"robot\"]\nbearings_deg = [0]\nrange_m = 2\n\
+                [sensors.eye.confusion]\nnothing = [1, 0, 0]\nwall = [0, 1, 0]\nrobot = [0, 0, 1]\n\
+                [[robots]]\ncount = 1\nsensors = [\"eye\"]\n\
+                [[doors]]\nat = [[2, 1]]\nperiodic = { open = 5, closed = 5 }\n";
+    let told = problems(&WORLDS, &Source::new("s.toml", text, ""));
+    let [one] = &told[..] else { panic!("{} problems: {told:?}", told.len()) };
+    assert_eq!(one.key(), Some("sensors.eye.observations"), "{one}");
+    let (_, remedy) = one.remedy().split_once("takes it for: ").expect("a remedy to paste");
+    let (statement, _) = remedy.split_once(" where").expect("the remedy's end");
+    let text = text.replace("range_m = 2", &format!("range_m = 2\n{statement}"));
+    assert_eq!(problems(&WORLDS, &Source::new("s.toml", text, "")), []);
+}

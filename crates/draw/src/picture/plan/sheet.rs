@@ -79,12 +79,15 @@ pub(in crate::picture) fn draw(
             "Below, altitudes seen from the south, drawn {times} times as long as distances."
         ));
     }
-    match place {
-        LegendPlace::Below => sheet.draw_legend_below(entries, width_px),
-        LegendPlace::Beside => sheet.draw_legend_beside(entries, width_px),
-    }
     let words = format!("{} {}", options.caption, notes.join(" "));
-    let svg = sheet.finish(&words, &options.title, width_px);
+    match place {
+        LegendPlace::Below => {
+            sheet.draw_legend_below(entries, width_px);
+            sheet.draw_words(&words, EDGE_PX, width_px);
+        }
+        LegendPlace::Beside => sheet.draw_column(entries, &words, width_px),
+    }
+    let svg = sheet.svg.finish(width_px, sheet.top + EDGE_PX, &options.title);
     Ok(DrawnPicture { svg, px_per_m: layout.px_per_m })
 }
 
@@ -352,24 +355,27 @@ impl PlanSheet<'_> {
         self.top = bottom + 6.0;
     }
 
-    /// Draws the legend in a column on the right of the plan, and the scale bar below the plan.
-    fn draw_legend_beside(&mut self, entries: Vec<LegendEntry>, width_px: f64) {
+    /// Draws legend, scale bar and small print in a column on the right of the plan, which then has the height for itself.
+    fn draw_column(&mut self, entries: Vec<LegendEntry>, words: &str, width_px: f64) {
         let map = self.plan.window.map;
         let size_px = self.plan.style.small_px();
-        let top = self.top + 12.0;
-        draw_scale_bar(&mut self.svg, self.plan, (map.x, top), width_px);
-        let column_px = Legend::column_px(&entries, size_px);
-        let legend = Legend::new(entries, size_px, column_px);
-        legend.draw(&mut self.svg, map.right() + COLUMN_GAP_PX, map.y);
-        self.top = (top + 2.4 * size_px).max(map.y + legend.height_px()) + 6.0;
+        let left = map.right() + COLUMN_GAP_PX;
+        let plan_bottom = self.top;
+        let legend = Legend::new(entries, size_px, width_px - left - EDGE_PX);
+        legend.draw(&mut self.svg, left, map.y);
+        let bar_top = map.y + legend.height_px() + size_px;
+        draw_scale_bar(&mut self.svg, self.plan, (left, bar_top), width_px);
+        self.top = bar_top + 3.6 * size_px;
+        self.draw_words(words, left, width_px);
+        self.top = self.top.max(plan_bottom);
     }
 
-    fn finish(mut self, words: &str, title: &str, width_px: f64) -> String {
+    /// Writes the small print from `left` on.
+    fn draw_words(&mut self, words: &str, left: f64, width_px: f64) {
         let size_px = self.plan.style.small_px();
-        let lines = text::wrap(words, size_px, Weight::Regular, width_px - 2.0 * EDGE_PX);
+        let lines = text::wrap(words, size_px, Weight::Regular, width_px - left - EDGE_PX);
         let style = small_print_style(size_px);
-        let end = paragraph(&mut self.svg, &lines, (EDGE_PX, self.top), &style);
-        self.svg.finish(width_px, end + EDGE_PX, title)
+        self.top = paragraph(&mut self.svg, &lines, (left, self.top), &style);
     }
 }
 
