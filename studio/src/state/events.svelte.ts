@@ -8,6 +8,9 @@ const MAX_EVENTS = 20_000;
 /** Maximum number of events per request; the server's own limit is higher. */
 const MAX_EVENTS_PER_REQUEST = 2000;
 
+/** Least time between two additions of events of frames: lists and ticks made anew for each frame cost more than its picture. */
+const ADD_INTERVAL_MS = 300;
+
 /** Requests the events of the cycles `from` to before `until`, without the first `skip` ones. */
 type FetchEvents = (from: number, until: number, skip: number, limit: number) => Promise<ReplyBody>;
 
@@ -31,8 +34,12 @@ export class Events {
   #fetchedUntil = 0;
   #isFetching = false;
   #age = 0;
+  /** Events of frames that are added together. */
+  #waiting: RunEvent[] = [];
+  #timer: ReturnType<typeof setTimeout> | null = null;
 
   clear(): void {
+    this.#waiting = [];
     this.list = [];
     this.kinds = new Map();
     this.leftOut = 0;
@@ -76,6 +83,23 @@ export class Events {
       this.add(entries.filter(({ cycle }) => cycle < last.cycle));
       this.#fetchedUntil = last.cycle;
     }
+  }
+
+  /** Adds the events of a frame: at once after a pause between frames, else together with those of the next ones. */
+  addOfFrame(entries: readonly RunEvent[]): void {
+    this.#waiting.push(...entries);
+    if (this.#timer !== null || this.#waiting.length === 0) return;
+    this.#addWaiting();
+    this.#timer = setTimeout(() => {
+      this.#timer = null;
+      this.addOfFrame([]);
+    }, ADD_INTERVAL_MS);
+  }
+
+  #addWaiting(): void {
+    const entries = this.#waiting;
+    this.#waiting = [];
+    this.add(entries);
   }
 
   /** Adds events that are not known yet. */

@@ -47,7 +47,7 @@ export class Session {
     this.frames = new Frames(this.client, {
       isAfterSeek: () => this.playback.onFrame(),
       onShown: (frame) => {
-        if (frame.text.events.length > 0) this.events.add(frame.text.events);
+        this.events.addOfFrame(frame.text.events);
         this.selection.scheduleInspection();
       },
     });

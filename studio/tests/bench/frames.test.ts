@@ -27,6 +27,7 @@ interface Count {
   cycles: number;
   leftOut: number;
   scripting_ms: number;
+  styling_ms: number;
   heap_mb: number;
   /** CPU time of each kind of process of the browser. */
   cpu_ms: Map<string, number>;
@@ -54,6 +55,7 @@ async function count(page: Page, client: CDPSession): Promise<Count> {
     cycles: await number("cycle"),
     leftOut: await number("left-out"),
     scripting_ms: 1000 * of("ScriptDuration"),
+    styling_ms: 1000 * (of("LayoutDuration") + of("RecalcStyleDuration")),
     heap_mb: of("JSHeapUsedSize") / 1e6,
     cpu_ms: await cpuByProcess(browser),
   };
@@ -83,6 +85,7 @@ test("ten thousand robots are shown", { timeout: 4 * WAIT_MS }, async () => {
   const perSecond = (after.pictures - before.pictures) / seconds;
   const pictures = after.pictures - before.pictures;
   const script = (after.scripting_ms - before.scripting_ms) / pictures;
+  const styling = (after.styling_ms - before.styling_ms) / pictures;
   const cpu = [...after.cpu_ms].map(
     ([kind, spent_ms]) => [kind, (spent_ms - (before.cpu_ms.get(kind) ?? 0)) / pictures] as const,
   );
@@ -92,7 +95,7 @@ test("ten thousand robots are shown", { timeout: 4 * WAIT_MS }, async () => {
   );
   console.log(
     `${perSecond.toFixed(1)} frames/s shown, ${((after.leftOut - before.leftOut) / seconds).toFixed(1)}/s left out, ` +
-      `${((after.cycles - before.cycles) / seconds).toFixed(0)} cycles/s, ${script.toFixed(1)} ms of script a frame, ` +
+      `${((after.cycles - before.cycles) / seconds).toFixed(0)} cycles/s, ${script.toFixed(1)} ms of script and ${styling.toFixed(1)} of layout a frame, ` +
       `heap ${before.heap_mb.toFixed(0)} -> ${after.heap_mb.toFixed(0)} MB`,
   );
   await page.screenshot({ path: "screenshots/crowd.png" });

@@ -1,6 +1,6 @@
 /** All events are fetched, in several requests if necessary, and missing ones are counted once. */
 
-import { expect, test } from "vitest";
+import { afterEach, expect, test, vi } from "vitest";
 import type { ReplyBody, RunEvent } from "../../src/protocol";
 import { Events } from "../../src/state/events.svelte";
 
@@ -81,4 +81,23 @@ test("events of hidden kinds are neither visible nor neighbors", () => {
   expect([events.neighbor(3, 1)?.cycle, events.neighbor(7, -1)?.cycle]).toEqual([7, 3]);
   events.toggleKind("turn");
   expect(events.neighbor(3, 1)?.cycle).toBe(5);
+});
+
+afterEach(() => vi.useRealTimers());
+
+test("events of frames come at once after a pause, and together while frames follow each other", () => {
+  vi.useFakeTimers();
+  const events = new Events();
+  events.addOfFrame([event(1, 0)]);
+  expect(events.list.length).toBe(1);
+  for (let cycle = 2; cycle <= 6; cycle++) events.addOfFrame([event(cycle, 0)]);
+  expect(events.list.length).toBe(1);
+  vi.advanceTimersByTime(1000);
+  expect(events.list.map(({ cycle }) => cycle)).toEqual([1, 2, 3, 4, 5, 6]);
+  events.addOfFrame([event(7, 0)]);
+  expect(events.list.length).toBe(7);
+  events.addOfFrame([event(8, 0)]);
+  events.clear();
+  vi.advanceTimersByTime(1000);
+  expect(events.list).toEqual([]);
 });
