@@ -102,6 +102,11 @@ export class Solids {
     this.#count = 0;
   }
 
+  /** Number of bodies since the last `begin`. */
+  get count(): number {
+    return this.#count;
+  }
+
   #next(): number {
     this.instances.reserve(this.#count + 1);
     return this.#count++;

@@ -13,6 +13,9 @@ const KINDS: readonly SolidKind[] = ["ball", "box", "cylinder", "dart"];
 /** Minimum ratio of the drawn width of a rod to its length. */
 const MIN_WIDTH_TO_LENGTH = 0.02;
 
+/** Number of glass bodies from which they cost more than all else in a picture. */
+const MANY_GLASS = 1000;
+
 /** Minimum radius of moving balls. */
 const MIN_BALL_PX = 1.6;
 
@@ -20,10 +23,18 @@ const MIN_BALL_PX = 1.6;
 class SolidLayers {
   readonly #solids: Record<SolidKind, [Solids, Solids]>;
 
-  constructor(group: Group) {
+  constructor(opaque: Group, glass: Group) {
     const both = (kind: SolidKind): [Solids, Solids] => [new Solids(kind, false), new Solids(kind, true)];
     this.#solids = { ball: both("ball"), box: both("box"), cylinder: both("cylinder"), dart: both("dart") };
-    for (const solids of this.#all()) group.add(solids.instances.mesh);
+    for (const kind of KINDS) {
+      opaque.add(this.#solids[kind][0].instances.mesh);
+      glass.add(this.#solids[kind][1].instances.mesh);
+    }
+  }
+
+  /** Number of glass bodies. */
+  get glassCount(): number {
+    return KINDS.reduce((sum, kind) => sum + this.#solids[kind][1].count, 0);
   }
 
   #all(): Solids[] {
@@ -70,8 +81,10 @@ class SolidLayers {
 
 export class SpacePainter implements Painter {
   readonly group = new Group();
-  readonly #static = new SolidLayers(this.group);
-  readonly #moving = new SolidLayers(this.group);
+  /** Glass bodies at rest. */
+  readonly #glass = new Group();
+  readonly #static = new SolidLayers(this.group, this.#glass);
+  readonly #moving = new SolidLayers(this.group, this.group);
   readonly #scene: Scene;
   #bodies: Bodies | null = null;
   #tints: Uint32Array = new Uint32Array(0);
@@ -80,6 +93,13 @@ export class SpacePainter implements Painter {
 
   constructor(scene: Scene) {
     this.#scene = scene;
+  }
+
+  /** The glass bodies at rest, where they are so many that they are to be drawn apart; null else. Call it after `paint`. */
+  takeGlass(): Group | null {
+    if (this.#static.glassCount >= MANY_GLASS) return this.#glass;
+    this.group.add(this.#glass);
+    return null;
   }
 
   paint(palette: Palette): void {
@@ -135,8 +155,9 @@ export class SpacePainter implements Painter {
   }
 
   dispose(): void {
-    this.group.traverse((object) => {
-      if ("geometry" in object) (object.geometry as { dispose(): void }).dispose();
-    });
+    for (const group of [this.group, this.#glass])
+      group.traverse((object) => {
+        if ("geometry" in object) (object.geometry as { dispose(): void }).dispose();
+      });
   }
 }

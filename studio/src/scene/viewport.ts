@@ -11,6 +11,7 @@ import { PlaneCamera, SpaceCamera, type Extent, type Camera } from "./camera";
 import { BodyColors, type ColorOptions } from "./body-colors";
 import type { ColorLegend } from "./coloring";
 import { extentOf, flatRadiusOf } from "./extent";
+import { GlassLayer } from "./glass-layer";
 import { FloorLayer } from "./floor";
 import { drawGrid } from "./grid";
 import { drawColorLegend } from "./color-legend";
@@ -128,6 +129,7 @@ export class Viewport {
   #painter: Painter;
   #plan: PlanView | null;
   #floor: FloorLayer | null;
+  #glass: GlassLayer | null = null;
   readonly #grid = new Strokes(1);
   readonly #trailStrokes = new Strokes(4);
   readonly #marks = new Strokes(8);
@@ -188,12 +190,23 @@ export class Viewport {
     this.#graph.add(this.#painter.group, this.#areas);
     this.#extent = extentOf(scene, null, null);
     this.setTheme(isDark);
+    this.#takeGlass();
+  }
+
+  /** Draws glass bodies apart, where the painter wants it. */
+  #takeGlass(): void {
+    if (this.#glass) this.#graph.remove(this.#glass.mesh);
+    this.#glass?.dispose();
+    const glass = this.#painter instanceof SpacePainter ? this.#painter.takeGlass() : null;
+    this.#glass = glass && new GlassLayer(glass);
+    if (this.#glass) this.#graph.add(this.#glass.mesh);
   }
 
   setTheme(isDark: boolean): void {
     this.#palette = paletteOf(isDark);
     this.#floor?.paint(this.#palette);
     this.#painter.paint(this.#palette);
+    this.#glass?.invalidate();
     const back = this.#floor ? this.#palette.background : this.#palette.free;
     this.#renderer.setClearColor(new Color().setRGB(back[0] / 255, back[1] / 255, back[2] / 255, SRGBColorSpace));
     this.#bodiesChanged = this.#marksChanged = true;
@@ -216,6 +229,7 @@ export class Viewport {
     if (this.#bodies) this.#painter.setBodies(this.#bodies, this.#palette);
     this.#extent = extentOf(scene, null, null);
     this.setTheme(this.#palette.isDark);
+    this.#takeGlass();
   }
 
   resize(width_px: number, height_px: number): void {
@@ -455,6 +469,7 @@ export class Viewport {
     cancelAnimationFrame(this.#request);
     this.#floor?.dispose();
     this.#painter.dispose();
+    this.#glass?.dispose();
     this.#dropColors();
     for (const strokes of [this.#grid, this.#trailStrokes, this.#marks]) strokes.quads.dispose();
     this.#dropAreas();
@@ -476,6 +491,7 @@ export class Viewport {
       else if (!this.#floor) drawGrid(this.#grid, this.camera, this.#extent, this.#size, this.#palette);
     }
     this.#bodiesChanged = this.#marksChanged = this.#viewChanged = false;
+    this.#glass?.update(this.#renderer, this.camera.threeCamera);
     this.#renderer.render(this.#graph, this.camera.threeCamera);
     const words = this.#plan?.wordLayer(this.#planState(this.#plan)) ?? null;
     this.#overlay.draw(this.camera, this.#extent, this.#labels(), this.#palette, words);
