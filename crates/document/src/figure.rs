@@ -162,8 +162,14 @@ impl Figure {
 
     /// Returns the numbers of runs behind its points, in words: "n = 8" or "n = 6 to 8"; `None` where none has one.
     pub fn runs_words(&self) -> Option<String> {
-        let counts = || self.series.iter().flat_map(|s| &s.points).filter_map(|p| p.n);
-        let (least, most) = counts().min().zip(counts().max())?;
+        let counts: Vec<usize> = match self.kind {
+            FigureKind::Runs { .. } => {
+                let runs = |s: &Series| s.points.iter().filter(|p| p.y.is_finite()).count();
+                self.series.iter().map(runs).collect()
+            }
+            _ => self.series.iter().flat_map(|s| &s.points).filter_map(|p| p.n).collect(),
+        };
+        let (least, most) = counts.iter().min().zip(counts.iter().max())?;
         Some(if least == most { format!("n = {most}") } else { format!("n = {least} to {most}") })
     }
 
@@ -203,14 +209,6 @@ impl Figure {
             }
             _ if self.interval_words.is_empty() => Vec::new(),
             _ => vec![&self.interval_words],
-        }
-    }
-
-    /// Returns the same words, to be replaced.
-    pub fn legend_words_mut(&mut self) -> Vec<&mut String> {
-        match &mut self.kind {
-            FigureKind::Runs { legend, .. } => vec![&mut legend.seed, &mut legend.mean],
-            _ => vec![&mut self.interval_words],
         }
     }
 

@@ -142,7 +142,9 @@ impl Legend {
             entry.label =
                 text::shorten(&entry.label, font_px, Weight::Regular, room_px - symbol_px);
             let width = symbol_px + text::width(&entry.label, font_px, Weight::Regular);
-            if x > 0.0 && x + width > room_px {
+            // Words about the entries that follow begin a row.
+            let is_heading = entry.symbol == LegendSymbol::None;
+            if x > 0.0 && (is_heading || x + width > room_px) {
                 x = 0.0;
                 row += 1;
             }

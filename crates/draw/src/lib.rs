@@ -51,7 +51,7 @@ pub use axis::Axis;
 pub use chart::bars::{Bar, BarChart, BarSeries};
 pub use chart::forest::{ForestChart, ForestMark, ForestSeries};
 pub use chart::heat::HeatChart;
-pub use chart::plot::{Mark, Plot, Point, Series};
+pub use chart::plot::{LegendGroup, LegendLook, Mark, Plot, Point, Series};
 pub use chart::slots::{QuartileBox, Slot, SlotChart};
 pub use chart::{DrawnChart, Spot};
 pub use error::DrawError;

@@ -132,25 +132,52 @@ fn plot(figure: &Figure, mark: Mark) -> Plot {
     {
         x_axis = x_axis.ticks(levels);
     }
+    let mut y_axis = axis(figure.y_scale, &figure.y_label);
+    if mark == Mark::Band {
+        (x_axis, y_axis) = band_axes(figure, x_axis, y_axis);
+    }
     let mut plot = Plot::new(&figure.title)
         .x_axis(x_axis)
         .interval_label(&figure.interval_words)
-        .y_axis(axis(figure.y_scale, &figure.y_label))
+        .y_axis(y_axis)
         .note(&figure.note);
-    let SeriesLooks { heading, labels, looks } = SeriesLooks::new(&figure.series);
-    for (series, (label, mut look)) in figure.series.iter().zip(labels.into_iter().zip(looks)) {
+    let SeriesLooks { looks, legend } = SeriesLooks::new(&figure.series);
+    for (series, mut look) in figure.series.iter().zip(looks) {
         // Steps of several series lie over each other where these begin and end.
         if mark == Mark::Steps {
             look.dash = look.color;
         }
         plot = plot.series(sidestep_draw::Series {
-            label,
+            label: series.name.clone(),
             points: series.points.iter().map(point).collect(),
             mark,
             look: Some(look),
         });
     }
-    plot.legend_heading(heading)
+    plot.legend_groups(legend)
+}
+
+/// Part of an axis of values that stays free beyond the last one.
+const AXIS_MARGIN: f64 = 0.04;
+
+/// Returns axes for bands over time: they end where the run does, and an interval of what is never below zero does not
+/// pull the axis there.
+fn band_axes(figure: &Figure, x_axis: Axis, y_axis: Axis) -> (Axis, Axis) {
+    let points = || figure.series.iter().flat_map(|s| &s.points).filter(|p| p.y.is_finite());
+    let ends = |point: &Point| point.interval.unwrap_or((point.y, point.y));
+    let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
+    let most = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::NEG_INFINITY, f64::max);
+    let x = [least(&mut points().map(|p| p.x)), most(&mut points().map(|p| p.x))];
+    let high = most(&mut points().map(|p| ends(p).1));
+    let mut low = least(&mut points().map(|p| ends(p).0));
+    let lowest_mean = least(&mut points().map(|p| p.y));
+    let margin = AXIS_MARGIN * (high - low);
+    // Zero belongs to an axis that comes near it.
+    low = if lowest_mean >= 0.0 && low < 0.4 * high { 0.0 } else { low - margin };
+    let is_range = |from: f64, to: f64| from.is_finite() && to.is_finite() && from < to;
+    let x_axis = if is_range(x[0], x[1]) { x_axis.range(x[0], x[1]) } else { x_axis };
+    let y_axis = if is_range(low, high) { y_axis.range(low, high + margin) } else { y_axis };
+    (x_axis, y_axis)
 }
 
 /// Largest number of levels that all have a tick.

@@ -130,10 +130,8 @@ impl PrintStyle {
     fn for_print(&self, figure: &Figure) -> Figure {
         let mut figure = Figure { title: String::new(), note: String::new(), ..figure.clone() };
         // Without its note, the legend says what is shown.
-        let tells_intervals =
-            !matches!(figure.kind, FigureKind::Runs { .. } | FigureKind::Forest { .. });
-        if figure.has_intervals() && tells_intervals {
-            let runs = figure.runs_words().map(|words| format!(", {words}")).unwrap_or_default();
+        let runs = figure.runs_words().map(|words| format!(", {words}")).unwrap_or_default();
+        if figure.has_intervals() && !matches!(figure.kind, FigureKind::Forest { .. }) {
             figure.interval_words = self.label(INTERVAL_WORDS) + &runs;
         }
         for label in [&mut figure.x_label, &mut figure.y_label] {
@@ -145,8 +143,9 @@ impl PrintStyle {
         for name in figure.position_names_mut() {
             *name = self.label_or_words(name);
         }
-        for words in figure.legend_words_mut() {
-            *words = self.label(words);
+        if let FigureKind::Runs { legend, .. } = &mut figure.kind {
+            legend.seed = self.label(&legend.seed);
+            legend.mean = self.label(&legend.mean) + &runs;
         }
         figure
     }

@@ -1,19 +1,17 @@
-//! The looks of series that differ by several factors: a color for each level of the first one, a marker or dashes for each
-//! level of the others.
+//! The looks of series that differ by factors: a color for each level of the first one, a marker and dashes for each level
+//! of the others.
 
 use sidestep_document::Series;
-use sidestep_draw::SeriesLook;
+use sidestep_draw::{LegendGroup, LegendLook, SeriesLook};
 
 /// Maximum number of dashes that can be told apart.
 const MAX_PATTERNS: usize = 4;
 
-/// The names and looks of the series of a figure.
+/// The looks of the series of a figure, and how a legend explains them.
 pub(crate) struct SeriesLooks {
-    /// What all names begin with, such as "count, policy"; empty where names say all.
-    pub(crate) heading: String,
-    /// The names below the heading.
-    pub(crate) labels: Vec<String>,
     pub(crate) looks: Vec<SeriesLook>,
+    /// A group for each thing that looks tell; none where each series is listed by its name.
+    pub(crate) legend: Vec<LegendGroup>,
 }
 
 /// Levels of factors, as names of variants have them: `count=6, policy=random`.
@@ -22,11 +20,8 @@ type Levels<'a> = Vec<(&'a str, &'a str)>;
 impl SeriesLooks {
     /// Returns the looks of series; each has its own color where their names are not levels of the same factors.
     pub(crate) fn new(series: &[Series]) -> Self {
-        Self::from_levels(series).unwrap_or_else(|| Self {
-            heading: String::new(),
-            labels: series.iter().map(|series| series.name.clone()).collect(),
-            looks: (0..series.len()).map(SeriesLook::of_series).collect(),
-        })
+        let looks = (0..series.len()).map(SeriesLook::of_series).collect();
+        Self::from_levels(series).unwrap_or(Self { looks, legend: Vec::new() })
     }
 
     fn from_levels(series: &[Series]) -> Option<Self> {
@@ -39,28 +34,31 @@ impl SeriesLooks {
         if all.len() < 2 || !all.iter().all(is_same) {
             return None;
         }
-        let values = |levels: &Levels<'_>| -> Vec<String> {
-            levels.iter().map(|(_, value)| (*value).to_string()).collect()
-        };
-        let firsts: Vec<String> = all.iter().map(|levels| levels[0].1.to_string()).collect();
-        let others: Vec<String> = all.iter().map(|levels| values(levels)[1..].join(", ")).collect();
-        let colors = numbers_of_first_use(&firsts);
-        let patterns = numbers_of_first_use(&others);
-        let has_patterns =
-            factors.len() > 1 && patterns.iter().all(|pattern| *pattern < MAX_PATTERNS);
-        let look = |index: usize| {
-            if has_patterns {
-                let pattern = patterns[index];
-                SeriesLook { color: colors[index], marker: pattern, dash: pattern }
-            } else {
-                SeriesLook::of_series(index)
-            }
-        };
-        Some(Self {
-            heading: factors.join(", "),
-            labels: all.iter().map(|levels| values(levels).join(", ")).collect(),
-            looks: (0..all.len()).map(look).collect(),
-        })
+        let first = DistinctWords::new(all.iter().map(|levels| levels[0].1.to_string()));
+        let others = DistinctWords::new(all.iter().map(|levels| {
+            let values: Vec<&str> = levels[1..].iter().map(|(_, value)| *value).collect();
+            values.join(", ")
+        }));
+        let own_look = |number: usize| LegendLook { color: Some(number), pattern: Some(number) };
+        if factors.len() == 1 {
+            let looks = first.numbers.iter().map(|number| SeriesLook::of_series(*number)).collect();
+            let legend = vec![first.into_group(factors[0], own_look)];
+            return Some(Self { looks, legend });
+        }
+        if others.words.len() > MAX_PATTERNS {
+            return None;
+        }
+        let pairs = first.numbers.iter().zip(&others.numbers);
+        let looks = pairs
+            .map(|(&color, &pattern)| SeriesLook { color, marker: pattern, dash: pattern })
+            .collect();
+        let color = |number: usize| LegendLook { color: Some(number), pattern: None };
+        let pattern = |number: usize| LegendLook { color: None, pattern: Some(number) };
+        let legend = vec![
+            first.into_group(factors[0], color),
+            others.into_group(&factors[1..].join(", "), pattern),
+        ];
+        Some(Self { looks, legend })
     }
 }
 
@@ -73,18 +71,31 @@ fn levels(name: &str) -> Option<Levels<'_>> {
     parts.collect()
 }
 
-/// Returns the number of each word among the different ones, in the order of their first use.
-fn numbers_of_first_use(words: &[String]) -> Vec<usize> {
-    let mut known: Vec<&String> = Vec::new();
-    let mut numbers = Vec::with_capacity(words.len());
-    for word in words {
-        let number = known.iter().position(|one| *one == word).unwrap_or_else(|| {
-            known.push(word);
-            known.len() - 1
-        });
-        numbers.push(number);
+/// Words without repetition, in the order of their first use.
+struct DistinctWords {
+    words: Vec<String>,
+    /// The number of each given word among the distinct ones.
+    numbers: Vec<usize>,
+}
+
+impl DistinctWords {
+    fn new(given: impl Iterator<Item = String>) -> Self {
+        let mut words: Vec<String> = Vec::new();
+        let mut numbers = Vec::new();
+        for word in given {
+            let known = words.iter().position(|one| *one == word);
+            numbers.push(known.unwrap_or(words.len()));
+            if known.is_none() {
+                words.push(word);
+            }
+        }
+        Self { words, numbers }
     }
-    numbers
+
+    fn into_group(self, heading: &str, look: impl Fn(usize) -> LegendLook) -> LegendGroup {
+        let entries = self.words.into_iter().enumerate().map(|(k, word)| (look(k), word)).collect();
+        LegendGroup { heading: heading.to_string(), entries }
+    }
 }
 
 #[cfg(test)]
@@ -97,26 +108,33 @@ mod tests {
         SeriesLooks::new(&series)
     }
 
+    fn labels(group: &LegendGroup) -> Vec<&str> {
+        group.entries.iter().map(|(_, label)| label.as_str()).collect()
+    }
+
     #[test]
-    fn two_factors_are_colors_and_patterns_and_their_names_stand_once() {
+    fn two_factors_are_colors_and_patterns_each_told_once() {
         let found = looks(&["n=6, rule = a", "n=6, rule = b", "n=12, rule = a", "n=12, rule = b"]);
-        assert_eq!(found.heading, "n, rule");
-        assert_eq!(found.labels, ["6, a", "6, b", "12, a", "12, b"]);
         let pairs: Vec<_> = found.looks.iter().map(|look| (look.color, look.dash)).collect();
         assert_eq!(pairs, [(0, 0), (0, 1), (1, 0), (1, 1)]);
+        let [colors, patterns] = &found.legend[..] else { panic!("two groups") };
+        assert_eq!((colors.heading.as_str(), labels(colors)), ("n", vec!["6", "12"]));
+        assert_eq!((patterns.heading.as_str(), labels(patterns)), ("rule", vec!["a", "b"]));
+        assert_eq!(colors.entries[1].0, LegendLook { color: Some(1), pattern: None });
+        assert_eq!(patterns.entries[1].0, LegendLook { color: None, pattern: Some(1) });
     }
 
     #[test]
     fn one_factor_or_other_names_have_a_color_for_each_series() {
         let found = looks(&["n = 6", "n = 12"]);
-        assert_eq!((found.heading.as_str(), found.labels[1].as_str()), ("n", "12"));
+        assert_eq!(labels(&found.legend[0]), ["6", "12"]);
         assert_eq!(found.looks[1], SeriesLook::of_series(1));
-        for names in [&["mvp", "pc"][..], &["n=6", "rule=a"], &["n=6", "pc"], &["n=6"], &[]] {
+        let many: Vec<String> = (0..6).map(|k| format!("n=1, rule={k}")).collect();
+        let many: Vec<&str> = many.iter().map(String::as_str).collect();
+        for names in [&["mvp", "pc"][..], &["n=6", "rule=a"], &["n=6", "pc"], &["n=6"], &[], &many]
+        {
             let found = looks(names);
-            assert_eq!(
-                (found.heading.as_str(), &found.labels[..]),
-                ("", &names.iter().map(|n| (*n).to_string()).collect::<Vec<_>>()[..])
-            );
+            assert_eq!((found.legend.len(), found.looks.len()), (0, names.len()), "{names:?}");
         }
     }
 }

@@ -91,7 +91,9 @@ export function followLink(studio: Studio): void {
 
   function go(): void {
     const cycle = request.takeCycle();
-    if (cycle !== null) studio.seek(cycle);
+    if (cycle === null) return;
+    // Of a file with two runs both, whether or not they go in step yet.
+    for (const session of studio.sessions) session.playback.seek(cycle);
   }
 
   function selectAgent(session: Session, bodies: Bodies): void {

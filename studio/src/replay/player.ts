@@ -38,7 +38,7 @@ export class ReplayPlayer {
   readonly #outbox: Outbox;
   #frame = 0;
   #state: SessionState = "paused";
-  #speed: Speed = { times: 1 };
+  #speed: Speed;
   #credit = 0;
   /** Whether the last frame that was sent is out of date. */
   #isStale = true;
@@ -55,6 +55,7 @@ export class ReplayPlayer {
     this.#id = id;
     this.#recording = recording;
     this.#outbox = outbox;
+    this.#speed = recording.run.status.speed;
   }
 
   /** The reply to the request that opens it. */
@@ -265,8 +266,8 @@ export class ReplayPlayer {
     const cause = `this file does not hold what it perceived and decided in cycle ${cycle}`;
     const remedy =
       inspected === ""
-        ? `export it again with \`--agents ${body.number}${part}\``
-        : `it holds that of ${inspected}; export it again with other --agents and --cycles`;
+        ? `an export with \`--agents ${body.number}${part}\` does`
+        : `it holds that of ${inspected}; an export with other --agents and --cycles holds more`;
     throw refusal(`${body.kind} ${body.number}${part}`, cause, remedy);
   }
 }

@@ -71,7 +71,8 @@ struct PrintArgs {
     #[arg(long, value_name = "STYLE", default_value = "paper", requires = "forms")]
     figure_style: FigureStyle,
 
-    /// Width and height in mm [default: 85x60, of slides 240x135]
+    /// Width and height in mm; differences in many metrics are as high as their rows need [default: 85x60, of slides
+    /// 240x135]
     #[arg(long, value_name = "WxH", requires = "forms")]
     figure_size: Option<String>,
 

@@ -114,7 +114,8 @@ impl ForestChart {
         let shown = self.ends().map(|end| end.clamp(-limit, limit));
         let beside = self.beside(style);
         // The axis has less room than that of other charts, so that it does not end at round numbers.
-        let across = max_ticks(&Style { width_px: 0.55 * style.width_px, ..*style }).0;
+        // Two ticks beside that at zero tell the scale.
+        let across = max_ticks(&Style { width_px: 0.55 * style.width_px, ..*style }).0.max(3);
         let (low, high) =
             shown.fold((0.0, 0.0), |(low, high): (f64, f64), end| (low.min(end), high.max(end)));
         let axis = if low < high {
@@ -152,15 +153,15 @@ impl ForestChart {
         Ok(frame.finish())
     }
 
-    /// Writes the head of the text, where it is not wider than the text.
+    /// Writes the head of the text above it, and above the area where it is wider: nothing else is there.
     fn draw_heading(&self, frame: &mut ChartFrame, style: &Style, beside: &EffectText) {
         let size = style.small_px();
-        let width_px = text::width(&self.heading, size, Weight::Regular) + TEXT_GAP_PX;
-        let text_style = TextStyle { fill: FAINT_INK, ..TextStyle::new(size, Anchor::Start) };
-        // It may extend over the last part of the area, above which nothing is.
+        let text_style = TextStyle { fill: FAINT_INK, ..TextStyle::new(size, Anchor::End) };
         let end = frame.area.right() + beside.width_px;
-        if beside.width_px > 0.0 && width_px < beside.width_px + 0.5 * frame.area.width {
-            let x = (frame.area.right() + TEXT_GAP_PX).min(end - width_px + TEXT_GAP_PX);
+        let width_px = text::width(&self.heading, size, Weight::Regular);
+        if beside.width_px > 0.0 && width_px < end {
+            // Where there is room, it begins where the text does.
+            let x = end.min(frame.area.right() + TEXT_GAP_PX + width_px).max(width_px);
             frame.svg.text(x, frame.area.y - 3.0, &self.heading, &text_style);
         }
     }
@@ -265,7 +266,7 @@ impl ForestChart {
                 let at = x.px(mark.value).clamp(frame.area.x, frame.area.right());
                 frame.push_spot((at, y), index, row);
             } else if !self.unmarked.is_empty() && !mark.text.is_empty() {
-                let faint = TextStyle { fill: FAINT_INK, ..text_style.clone() };
+                let faint = TextStyle { fill: FAINT_INK, halo: true, ..text_style };
                 let words = text::shorten(
                     &self.unmarked,
                     size,

@@ -19,7 +19,7 @@ const UPRIGHT_GAP_PX: f64 = 4.0;
 /// Largest fraction of the picture's height that upright names take; longer ones are cut off.
 const MAX_UPRIGHT_FRACTION: f64 = 0.4;
 /// Least fraction of the picture's height for the data: long labels make the picture higher, not the data flat.
-const MIN_AREA_FRACTION: f64 = 0.55;
+const MIN_AREA_FRACTION: f64 = 0.4;
 /// Largest fraction of the picture's width that labels of the vertical axis take; longer ones are broken. Numbers never
 /// are so long, names of metrics are.
 pub(crate) const MAX_TICK_LABEL_FRACTION: f64 = 0.34;

@@ -103,6 +103,24 @@ impl Series {
     }
 }
 
+/// A part of a legend that explains one thing of looks: the levels of a factor, say.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LegendGroup {
+    /// The words before it, such as the name of the factor.
+    pub heading: String,
+    /// The looks that it explains, each with its label.
+    pub entries: Vec<(LegendLook, String)>,
+}
+
+/// What an entry of a group shows: a color, a pattern, or both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LegendLook {
+    /// Number of a color; gray without one.
+    pub color: Option<usize>,
+    /// Number of a marker and of dashes; a plain line or a filled box without one.
+    pub pattern: Option<usize>,
+}
+
 /// A straight line in data coordinates, such as the ideal speed-up.
 #[derive(Debug, Clone, PartialEq)]
 struct IdealLine {
@@ -122,7 +140,7 @@ pub struct Plot {
     x: Axis,
     y: Axis,
     series: Vec<Series>,
-    legend_heading: String,
+    legend_groups: Vec<LegendGroup>,
     interval_label: String,
     ideals: Vec<IdealLine>,
     references: Vec<ReferencePath>,
@@ -144,7 +162,7 @@ impl Plot {
             x: Axis::linear("x"),
             y: Axis::linear("y"),
             series: vec![],
-            legend_heading: String::new(),
+            legend_groups: Vec::new(),
             interval_label: String::new(),
             ideals: vec![],
             references: vec![],
@@ -172,10 +190,10 @@ impl Plot {
         self
     }
 
-    /// Sets the words before the legend, such as the factors whose levels are the labels.
+    /// Explains colors and patterns one by one, in place of a list of all series.
     #[must_use]
-    pub fn legend_heading(mut self, heading: impl Into<String>) -> Self {
-        self.legend_heading = heading.into();
+    pub fn legend_groups(mut self, groups: Vec<LegendGroup>) -> Self {
+        self.legend_groups = groups;
         self
     }
 
@@ -277,9 +295,11 @@ impl Plot {
         self.series.iter().flat_map(|s| &s.points).filter(|p| self.contains(p))
     }
 
-    /// Returns one entry per series and ideal line.
+    /// Returns one entry per series, or those of the groups, and one per ideal line.
     fn legend(&self) -> Vec<LegendEntry> {
-        let series = self.series.iter().enumerate().map(|(index, series)| {
+        let groups = self.legend_groups.iter().flat_map(|group| self.group_entries(group));
+        let listed = if self.legend_groups.is_empty() { &self.series[..] } else { &[] };
+        let series = listed.iter().enumerate().map(|(index, series)| {
             let look = self.look(index);
             let color = series_color(look.color).into();
             let marker = Marker::of_series(look.marker);
@@ -297,7 +317,6 @@ impl Plot {
         let dashes = ideals
             .chain(references)
             .map(|label| LegendEntry::new(LegendSymbol::Dashes { color: FAINT_INK }, label));
-        let heading = LegendEntry::new(LegendSymbol::None, &self.legend_heading);
         let are_bands = self.series.iter().any(|series| series.mark == Mark::Band);
         let intervals = if are_bands {
             let fill = FAINT_INK.into();
@@ -306,7 +325,31 @@ impl Plot {
             LegendSymbol::Mean { color: FAINT_INK.into() }
         };
         let intervals = LegendEntry::new(intervals, &self.interval_label);
-        std::iter::once(heading).chain(series).chain(dashes).chain([intervals]).collect()
+        groups.chain(series).chain(dashes).chain([intervals]).collect()
+    }
+
+    /// Returns the heading of a group and its entries.
+    fn group_entries(&self, group: &LegendGroup) -> Vec<LegendEntry> {
+        let has_markers = self.series.iter().any(Series::shows_markers);
+        let has_lines = self.series.iter().any(|series| series.mark != Mark::Points);
+        let mut entries = vec![LegendEntry::new(LegendSymbol::None, &group.heading)];
+        for (look, label) in &group.entries {
+            let color = look.color.map_or_else(|| FAINT_INK.to_string(), series_color);
+            let pattern = look.pattern.map(Marker::of_series).filter(|_| has_markers);
+            let symbol = match (has_lines, pattern) {
+                (false, Some(marker)) => LegendSymbol::Marker { color: color.into(), marker },
+                (true, marker) => {
+                    let dash =
+                        SeriesLook { dash: look.pattern.unwrap_or(0), ..SeriesLook::of_series(0) };
+                    LegendSymbol::Line { color: color.into(), marker, dash: dash.dash_attribute() }
+                }
+                (false, None) => {
+                    LegendSymbol::Swatch { fill: color.into(), rim: "none".into(), opacity: 1.0 }
+                }
+            };
+            entries.push(LegendEntry::new(symbol, label));
+        }
+        entries
     }
 
     fn draw_lines(&self, frame: &mut ChartFrame, x: Scale, index: usize, style: &Style) {

@@ -396,6 +396,11 @@ impl SweepReader<'_> {
     /// Returns an entry of the list; its `name` is no setting.
     fn listed_variant(&self, table: &Spanned<toml::Table>) -> Result<Variant, InputError> {
         let mut own = table.get_ref().clone();
+        if own.contains_key("set") {
+            let cause = "a variant has its keys directly, without `set`";
+            let remedy = "write robots.count = 20 in it, or in [set] for all variants";
+            return Err(self.source.error(Some(table.span()), cause, remedy));
+        }
         match own.remove("name") {
             None => Ok(settings(&own).into()),
             Some(Value::String(name)) if !name.is_empty() => {
@@ -597,6 +602,7 @@ max_runs = 200
                 "0 to 1",
             ),
             ("repliactes = 3\n", "unknown key `repliactes`"),
+            ("[[variant]]\nname = \"a\"\nset = { b = 3 }\n", "without `set`"),
         ] {
             let error = parse(&format!("{head}{text}")).expect_err(text);
             assert!(error.cause().contains(cause), "{error}");

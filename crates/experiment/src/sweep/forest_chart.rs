@@ -199,8 +199,8 @@ impl EffectUnit {
     /// Returns why an effect has no mark.
     fn unmarked(self, baseline: &str) -> String {
         match self {
-            Self::Percent => format!("mean of {baseline} near 0"),
-            Self::StandardDeviations => format!("runs of {baseline} equal"),
+            Self::Percent => format!("{baseline}: near 0"),
+            Self::StandardDeviations => format!("{baseline}: all equal"),
         }
     }
 

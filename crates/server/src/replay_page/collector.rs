@@ -158,7 +158,7 @@ impl<'a> ReplayCollector<'a> {
             cycle: cycle as f64,
             cycles_planned: run.cycle() as f64,
             time_s: cycle as f64 * self.scenery.cycle_s,
-            speed: Speed::Times(1.0),
+            speed: first_speed(run.cycle() as f64 * self.scenery.cycle_s),
             cycles_per_s: 0.0,
             seed: run.config().seed.to_string(),
             digest: None,
@@ -236,6 +236,17 @@ impl<'a> ReplayCollector<'a> {
         }
         Ok(spans)
     }
+}
+
+/// Longest time in seconds that a replay takes to play as it opens.
+const MAX_PLAY_S: f64 = 60.0;
+/// Speeds that a page offers, from that of the run on.
+const SPEEDS: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
+
+/// Returns the lowest speed at which a run is over within a minute: nobody watches for longer.
+fn first_speed(run_s: f64) -> Speed {
+    let [.., fastest] = SPEEDS;
+    Speed::Times(SPEEDS.into_iter().find(|speed| run_s <= speed * MAX_PLAY_S).unwrap_or(fastest))
 }
 
 impl FrameSink for ReplayCollector<'_> {

@@ -94,7 +94,12 @@ impl<'a> BaseSource<'a> {
         variant: &Variant,
     ) -> Result<(Source, Box<dyn CompiledScenario>), InputError> {
         let overrides: Vec<String> = variant.settings.iter().map(Setting::to_override).collect();
-        let source = self.source.clone().with_overrides(&overrides)?;
+        let source = self.source.clone().with_overrides(&overrides).map_err(|error| {
+            // Nobody has typed the option that a setting of a file stands for.
+            let setting = error.place().trim_start_matches("--set ");
+            let place = format!("{}, where {variant}", self.source.file_place());
+            InputError::new(place, format!("{setting}: {}", error.cause()), error.remedy())
+        })?;
         match self.worlds.compile(&source) {
             Ok(compiled) => Ok((source, compiled)),
             Err(error) => Err(self.variant_error(variant, error)),
