@@ -175,8 +175,11 @@ fn band_axes(figure: &Figure, x_axis: Axis, y_axis: Axis) -> (Axis, Axis) {
     // Zero belongs to an axis that comes near it.
     low = if lowest_mean >= 0.0 && low < 0.4 * high { 0.0 } else { low - margin };
     let is_range = |from: f64, to: f64| from.is_finite() && to.is_finite() && from < to;
-    let x_axis = if is_range(x[0], x[1]) { x_axis.range(x[0], x[1]) } else { x_axis };
-    let y_axis = if is_range(low, high) { y_axis.range(low, high + margin) } else { y_axis };
+    let is_linear = |scale: Scale| scale == Scale::Linear;
+    let has_x = is_linear(figure.x_scale) && is_range(x[0], x[1]);
+    let has_y = is_linear(figure.y_scale) && is_range(low, high);
+    let x_axis = if has_x { x_axis.range(x[0], x[1]) } else { x_axis };
+    let y_axis = if has_y { y_axis.range(low, high + margin) } else { y_axis };
     (x_axis, y_axis)
 }
 

@@ -175,7 +175,7 @@ mod tests {
             level: Severity::Warning,
             kind: LogEventKind::Contact,
             who: BodyId::new(ROBOT, cycle as u32 % 7, None),
-            with: (cycle % 3 == 0).then(|| BodyId::new(PERSON, 2, Some(1))),
+            with: cycle.is_multiple_of(3).then(|| BodyId::new(PERSON, 2, Some(1))),
             at_m: Some([cycle as f64, f64::MIN_POSITIVE, -0.0]),
             value: Some(Quantity::new(0.1 * cycle as f64, "m")),
             words: format!("touches a wall in cycle {cycle}"),

@@ -13,6 +13,17 @@ const MAX_GROWTH: f64 = 2.5;
 /// Most layouts that are tried for one size: the room that words take is known after the first, but for line breaks.
 const MAX_LAYOUTS: usize = 5;
 
+/// Least gain in the scale of a picture for which its words are made smaller.
+const MIN_GAIN: f64 = 1.25;
+
+/// A picture in a layout that is shown in the given size.
+struct SizedPicture {
+    svg: String,
+    layout_px: [f64; 2],
+    /// Its scale, up to a factor that is the same for all layouts.
+    shown_px_per_m: f64,
+}
+
 /// Draws a picture in the layout of the options, with its legend somewhere.
 type DrawLayout<'a> = dyn Fn(&PictureOptions, LegendPlace) -> Result<DrawnPicture, DrawError> + 'a;
 
@@ -30,6 +41,7 @@ pub(super) fn fit(
     let longer_px = size_px[0].max(size_px[1]);
     let layout_px = options.style.width_px.max(options.style.height_px);
     let least = (layout_px / longer_px).min(1.0);
+    let mut chosen: Option<SizedPicture> = None;
     for enlargement in ENLARGEMENTS {
         let layout_px = size_px.map(|side_px| side_px * least * enlargement);
         if options.may_grow {
@@ -49,9 +61,18 @@ pub(super) fn fit(
             let most = best.as_ref().map_or(0.0, |best| best.px_per_m);
             best = drawn.filter(|drawn| drawn.px_per_m > most).or(best);
         }
-        if let Some(best) = best {
-            return Ok(on_page(&best.svg, layout_px, size_px));
+        let Some(drawn) = best else { continue };
+        let shown_px_per_m = drawn.px_per_m / enlargement;
+        // Words that leave little room for the picture are better smaller.
+        let is_larger =
+            chosen.as_ref().is_none_or(|chosen| shown_px_per_m >= MIN_GAIN * chosen.shown_px_per_m);
+        if !is_larger {
+            break;
         }
+        chosen = Some(SizedPicture { svg: drawn.svg, layout_px, shown_px_per_m });
+    }
+    if let Some(chosen) = chosen {
+        return Ok(on_page(&chosen.svg, chosen.layout_px, size_px));
     }
     let value = longer_px;
     Err(DrawError::Value {
