@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,12 +92,12 @@ def trajectories(folder: str | os.PathLike[str], *, every: int = 1) -> list[ArmT
     return arm_trajectories(folder, checked_int("every", every, 1, 2**32))
 
 
-def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> FkResult:
+def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | Mapping[str, ArrayLike] | None = None) -> FkResult:
     """Forward kinematics: the positions of an arm's tip and connectors.
 
     ``arm`` is an :class:`Arm` or a URDF file. ``joints`` are values in rad or m, one for each of ``arm.joints``, of the shape
-    (joints,) or (n, joints); without them, each is as close to zero as its limits allow. Values outside the limits are
-    computed too.
+    (joints,) or (n, joints); without them, each is as close to zero as its limits allow. A data frame, a table or a dict gives
+    the values of each joint by its name, whatever the order of its columns. Values outside the limits are computed too.
 
     Raises InputError when a file or a shape is wrong.
 
@@ -109,8 +109,24 @@ def fk(arm: Arm | str | os.PathLike[str], joints: ArrayLike | None = None) -> Fk
     (3, 3)
     """
     arm = arm if isinstance(arm, Arm) else Arm(arm)
-    values = arm.posture() if joints is None else joints
+    values = arm.posture() if joints is None else _in_order("joints", arm.joints, joints)
     return arm.forward(_rows("joints", values))
+
+
+def _in_order(name: str, joints: Sequence[str], values: ArrayLike | Mapping[str, ArrayLike]) -> ArrayLike:
+    """Returns the values of joints in their order; columns are found by their names, as recordings have an order of their own."""
+    columns = values.keys() if isinstance(values, Mapping) else getattr(values, "columns", None)
+    # Arrow's tables have their columns themselves there, and their names elsewhere.
+    columns = getattr(values, "column_names", columns)
+    if columns is None:
+        return cast(ArrayLike, values)
+    known = [str(column) for column in columns]
+    missing = [joint for joint in joints if joint not in known]
+    if missing:
+        cause = f"there is no column `{missing[0]}` among {', '.join(known)}"
+        raise input_error(name, cause, "name the columns by `arm.joints`, or give an array in their order")
+    named = cast(Any, values)
+    return np.stack([np.atleast_1d(np.asarray(named[joint], np.float64)) for joint in joints], axis=-1)
 
 
 def ik(

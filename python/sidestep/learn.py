@@ -53,7 +53,7 @@ def effector(
 ) -> Learned:
     """Learns the outcomes of an effector's actions.
 
-    ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, :class:`sidestep.Table`): ``action``
+    ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, pyarrow, :class:`sidestep.Table`): ``action``
     (``"forward"``, ``"left"``, ``"right"``, ``"stay"``), ``ahead_boxes`` and ``left_boxes``, displacements in boxes in the frame
     of the start, ``turn_deg``, positive to the left, and optionally ``contact`` (``"yes"`` where an obstacle stopped it: such rows
     are skipped), ``robot``, a number by which robots that differ are found, ``effector``, and ``delay_cycles``, the steps without
@@ -159,7 +159,8 @@ def _csv(columns: Mapping[str, Any] | Any, known: Sequence[str]) -> str:
 
 
 def _has(columns: Any, name: str) -> bool:
-    keys = getattr(columns, "columns", None)
+    # Arrow's tables have their columns themselves as `columns`.
+    keys = getattr(columns, "column_names", getattr(columns, "columns", None))
     return name in (columns if keys is None else list(keys))
 
 

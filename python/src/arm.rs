@@ -3,6 +3,7 @@
 use crate::choice::choose;
 use crate::error::{self, argument_error};
 use crate::json::to_list;
+use crate::pickle::{self, ArmSource};
 use crate::result::{Fields, ResultClass};
 use crate::watch::run_polling;
 use crate::worlds;
@@ -34,7 +35,31 @@ use std::path::PathBuf;
 /// >>> len(arm.joints) == len(arm.units)
 /// True
 #[pyclass(module = "sidestep", frozen)]
-pub(crate) struct Arm(ArmModel);
+pub(crate) struct Arm {
+    model: ArmModel,
+    /// Its files, for pickles.
+    source: ArmSource,
+}
+
+impl Arm {
+    /// Loads an arm from its files.
+    pub(crate) fn load(source: ArmSource) -> PyResult<Self> {
+        let files = ArmFiles {
+            urdf: source.urdf.0.clone(),
+            srdf: source.srdf.as_ref().map(|(path, _)| path.clone()),
+            base: source.base.clone(),
+            tip: source.tip.clone(),
+            group: source.group.clone(),
+        };
+        Self::load_files(&files, source)
+    }
+
+    /// Loads an arm from copies of its files.
+    pub(crate) fn load_files(files: &ArmFiles, source: ArmSource) -> PyResult<Self> {
+        let model = files.load().map_err(|e| option_error(&e))?;
+        Ok(Self { model, source })
+    }
+}
 
 /// Returns the error of an option of the command as that of an argument.
 fn option_error(e: &InputError) -> PyErr {
@@ -161,44 +186,57 @@ impl Arm {
         if group.is_some() && (base.is_some() || tip.is_some()) {
             return Err(argument_error("group", "it names base and tip", "leave base and tip out"));
         }
-        let arm = ArmFiles { urdf, base, tip, srdf, group }.load();
-        arm.map(Self).map_err(|e| option_error(&e))
+        let files = ArmFiles { urdf, base, tip, srdf, group };
+        let model = files.load().map_err(|e| option_error(&e))?;
+        // Both are readable, or the model could not have been loaded.
+        let with_text = |path: &PathBuf| {
+            let text = std::fs::read_to_string(path).unwrap_or_default();
+            (std::path::absolute(path).unwrap_or_else(|_| path.clone()), text)
+        };
+        let source = ArmSource {
+            urdf: with_text(&files.urdf),
+            srdf: files.srdf.as_ref().map(with_text),
+            base: files.base,
+            tip: files.tip,
+            group: files.group,
+        };
+        Ok(Self { model, source })
     }
 
     /// Name of the robot.
     #[getter]
     fn robot(&self) -> &str {
-        &self.0.model.name
+        &self.model.model.name
     }
 
     /// Name of the base link.
     #[getter]
     fn base(&self) -> &str {
-        &self.0.chain.base
+        &self.model.chain.base
     }
 
     /// Name of the tip link.
     #[getter]
     fn tip(&self) -> &str {
-        &self.0.chain.tip
+        &self.model.chain.tip
     }
 
     /// Names of the joints that have a value, outward from the base.
     #[getter]
     fn joints(&self) -> Vec<&str> {
-        self.0.chain.variables.iter().map(|v| v.name.as_str()).collect()
+        self.model.chain.variables.iter().map(|v| v.name.as_str()).collect()
     }
 
     /// Units of their values: rad or m.
     #[getter]
     fn units(&self) -> Vec<&'static str> {
-        self.0.chain.variables.iter().map(|v| v.motion.unit()).collect()
+        self.model.chain.variables.iter().map(|v| v.motion.unit()).collect()
     }
 
     /// Lowest and highest values, of the shape (joints, 2); infinite where a joint has no limits.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let variables = &self.0.chain.variables;
+        let variables = &self.model.chain.variables;
         let mut flat = Vec::with_capacity(2 * variables.len());
         for variable in variables {
             match &variable.limits {
@@ -222,7 +260,7 @@ impl Arm {
         py: Python<'py>,
         name: Option<&str>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(PyArray1::from_vec(py, self.0.named_posture(name).map_err(|e| option_error(&e))?))
+        Ok(PyArray1::from_vec(py, self.model.named_posture(name).map_err(|e| option_error(&e))?))
     }
 
     /// What was not taken as it stood in its files, as `Finding` objects, like `sidestep.inspect` names it.
@@ -231,16 +269,24 @@ impl Arm {
     /// []
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let findings = self.0.findings().into_iter().map(|finding| {
+        let findings = self.model.findings().into_iter().map(|finding| {
             let fields = serde_json::to_value(finding).expect("a finding is plain data");
             Fields::from_json(py, &fields)?.build(ResultClass("sidestep._inspect", "Finding"))
         });
         PyList::new(py, findings.collect::<PyResult<Vec<_>>>()?)
     }
 
+    /// Pickles the arm with the texts of its files; meshes that these name are taken from their places.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (ArmSource,))> {
+        Ok((pickle::maker(py, "unpack_arm")?, (self.source.clone(),)))
+    }
+
     fn __repr__(&self) -> String {
-        let robot = &self.0.model.name;
-        let chain = &self.0.chain;
+        let robot = &self.model.model.name;
+        let chain = &self.model.chain;
         format!("Arm({robot}, {} to {}, {} joints)", chain.base, chain.tip, chain.variables.len())
     }
 
@@ -250,7 +296,7 @@ impl Arm {
         py: Python<'py>,
         joints: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let chain = &self.0.chain;
+        let chain = &self.model.chain;
         let rows = matrix_rows("joints", &joints, chain.variables.len())?;
         let skeleton = chain.skeleton();
         let frames: Vec<LinkFrames> =
@@ -285,10 +331,10 @@ impl Arm {
         start: PyReadonlyArray2<'py, f64>,
         options: IkOptions,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let chain = &self.0.chain;
+        let chain = &self.model.chain;
         let targets = matrix_rows("targets", &targets, targets.as_array().ncols())?;
         let start = matrix_rows("start", &start, chain.variables.len())?;
-        let (goal, remarks) = options.common_goal(&self.0)?;
+        let (goal, remarks) = options.common_goal(&self.model)?;
         if start.len() != 1 && start.len() != targets.len() {
             let cause = format!("{} postures for {} targets", start.len(), targets.len());
             return Err(argument_error("start", cause, "give one for all, or one for each"));

@@ -3,14 +3,15 @@
 use crate::arrays::{UnsignedArg, order_values};
 use crate::error::{self, argument_error};
 use crate::json::{to_list, to_python};
-use crate::scenario::{LoadedScenario, Scenario, load};
+use crate::pickle;
+use crate::scenario::{Bundle, LoadedScenario, Scenario, load};
 use crate::space::{OutArrays, Team, zeroed_arrays};
 use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList};
 use sidestep::kernel::batch::{self, BatchError, SimulationFactory};
 use sidestep::kernel::control;
-use sidestep::scenario::Source;
+use sidestep::scenario::{ResolvedScenario, Source};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -63,6 +64,34 @@ impl Batch {
             let mut batch = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
             work(&mut batch).map_err(|e| batch_error(&e))
         })
+    }
+
+    /// Starts a world with each of the seeds.
+    fn start(
+        py: Python<'_>,
+        scenario: Arc<LoadedScenario>,
+        seeds: &[u64],
+        workers: usize,
+    ) -> PyResult<Self> {
+        let start = start_function(&scenario)?;
+        let batch = py.detach(|| batch::Batch::new(start, seeds, workers));
+        let batch = batch.map_err(|e| batch_error(&e))?;
+        let teams = batch.agent_teams().iter().cloned().map(Arc::new).collect();
+        let worlds = seeds.len();
+        Ok(Self { scenario, teams, worlds, workers, batch: Mutex::new(batch) })
+    }
+
+    /// Starts a world with each of the seeds, and continues it from a state.
+    pub(crate) fn from_states(
+        py: Python<'_>,
+        scenario: Arc<LoadedScenario>,
+        seeds: &[u64],
+        workers: usize,
+        states: Vec<Vec<u8>>,
+    ) -> PyResult<Self> {
+        let batch = Self::start(py, scenario, seeds, workers)?;
+        batch.with_worlds(py, |worlds| worlds.restore(&states))?;
+        Ok(batch)
     }
 
     fn find_team(&self, team: Option<&Bound<'_, PyAny>>) -> PyResult<(usize, &control::AgentTeam)> {
@@ -180,11 +209,7 @@ impl Batch {
                 })?
             }
         };
-        let start = start_function(&scenario)?;
-        let batch = py.detach(|| batch::Batch::new(start, &seeds, workers));
-        let batch = batch.map_err(|e| batch_error(&e))?;
-        let teams = batch.agent_teams().iter().cloned().map(Arc::new).collect();
-        Ok(Self { scenario, teams, worlds, workers, batch: Mutex::new(batch) })
+        Self::start(py, scenario, &seeds, workers)
     }
 
     /// The scenario.
@@ -354,6 +379,19 @@ impl Batch {
             }
         }
         self.with_worlds(py, |batch| batch.restart(&seeds))
+    }
+
+    /// Pickles the worlds in their states; orders that wait for the next step are not in it.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bundle, Vec<u64>, usize, Vec<Bound<'py, PyBytes>>))> {
+        let ResolvedScenario { text, files } = self.scenario.resolved()?.clone();
+        let (seeds, states) = self.with_worlds(py, |batch| {
+            Ok((batch.seeds(), batch.map_worlds(|run| run.checkpoint())?))
+        })?;
+        let states = states.iter().map(|state| PyBytes::new(py, state)).collect();
+        Ok((pickle::maker(py, "unpack_batch")?, ((text, files), seeds, self.workers, states)))
     }
 
     fn __len__(&self) -> usize {

@@ -12,6 +12,7 @@
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
 //! json.rs        values of other kinds      notebook.rs     output of notebook cells
 //! result.rs      results, by name           choice.rs       words that choose a value
+//! pickle.rs      what travels between processes
 //! error.rs       the exceptions             watch.rs        Ctrl-C
 //! worlds.rs      the list of worlds, and what each declares
 //! ```
@@ -31,6 +32,7 @@ mod inspect;
 mod json;
 mod learn;
 mod notebook;
+mod pickle;
 mod policy;
 mod read;
 mod result;
@@ -69,6 +71,11 @@ fn add_simulation(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(arrays::rows_by_name, module)?)?;
     module.add_function(wrap_pyfunction!(inspect::inspect, module)?)?;
     module.add_function(wrap_pyfunction!(inspect::write_clean, module)?)?;
+    module.add_function(wrap_pyfunction!(pickle::unpack_arm, module)?)?;
+    module.add_function(wrap_pyfunction!(pickle::unpack_batch, module)?)?;
+    module.add_function(wrap_pyfunction!(pickle::unpack_space, module)?)?;
+    module.add_function(wrap_pyfunction!(pickle::unpack_table, module)?)?;
+    module.add_function(wrap_pyfunction!(pickle::unpack_team, module)?)?;
     module.add_function(wrap_pyfunction!(read::read, module)?)?;
     module.add_function(wrap_pyfunction!(read::table_names, module)?)?;
     module.add_function(wrap_pyfunction!(scenario::schema, module)?)?;

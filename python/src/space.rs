@@ -2,6 +2,7 @@
 
 use crate::error::{self, argument_error};
 use crate::json::to_list;
+use crate::pickle::{self, SpaceBounds};
 use numpy::{
     PyArray1, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArrayMethods, ToPyArray,
 };
@@ -85,6 +86,15 @@ impl Space {
         &self.0.meaning
     }
 
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<usize>, SpaceBounds, String))> {
+        let control::ValueSpace { name, shape, kind, meaning } = &self.0;
+        let values = (name.clone(), shape.clone(), kind.into(), meaning.clone());
+        Ok((pickle::maker(py, "unpack_space")?, values))
+    }
+
     fn __repr__(&self) -> String {
         format!("Space({}, shape={:?}: {})", self.0.name, self.0.shape, self.0.describe())
     }
@@ -136,6 +146,22 @@ impl Team {
     #[getter]
     fn ordered<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.action_spaces(py)
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        Bound<'py, PyAny>,
+        (String, Vec<u32>, Bound<'py, PyList>, Bound<'py, PyList>),
+    )> {
+        let values = (
+            self.0.name.clone(),
+            self.0.agents.clone(),
+            self.observation_spaces(py)?,
+            self.action_spaces(py)?,
+        );
+        Ok((pickle::maker(py, "unpack_team")?, values))
     }
 
     fn __len__(&self) -> usize {

@@ -4,6 +4,7 @@ use crate::arrays::UnsignedArg;
 use crate::error;
 use crate::json::to_list;
 use crate::notebook::to_html;
+use crate::pickle;
 use crate::worlds;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
@@ -17,9 +18,9 @@ use arrow_schema::ffi::FFI_ArrowSchema;
 use arrow_schema::{ArrowError, DataType, Field, Schema};
 use numpy::{PyArray1, ToPyArray};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyKeyError;
+use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict, PyList, PyTuple};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PySlice, PyTuple};
 use sidestep::experiment::sweep::{Role, RunColumn};
 use sidestep::kernel::ports::{Cells, ColumnSpec, ColumnType, ColumnValues, TableSchema};
 use sidestep::scenario::{MetricInfo, metric_label};
@@ -69,6 +70,30 @@ impl Table {
         });
         let schema = TableSchema::new(name, specs.collect());
         Self::new(schema, columns.into_iter().map(|column| column.values).collect())
+    }
+
+    /// Returns a table of rows as they were in another one; or says what is wrong with them.
+    pub(crate) fn from_arrow(
+        name: String,
+        about: Vec<(String, String)>,
+        batch: RecordBatch,
+    ) -> Result<Self, String> {
+        let fields = batch.schema().fields().clone();
+        let specs = fields.iter().zip(batch.columns()).map(|(field, array)| spec(field, array));
+        let columns = specs.collect::<Result<Vec<_>, String>>()?;
+        let schema = TableSchema { about, ..TableSchema::new(&name, columns) };
+        Ok(Self { schema, batch })
+    }
+
+    /// Returns the rows of a slice.
+    fn slice(&self, slice: &Bound<'_, PySlice>) -> PyResult<Self> {
+        let rows = slice.indices(self.batch.num_rows() as isize)?;
+        if rows.step != 1 && rows.slicelength > 1 {
+            let cause = format!("the step of a slice of rows is {}", rows.step);
+            return Err(PyValueError::new_err(format!("{cause}\n  help: leave the step out")));
+        }
+        let batch = self.batch.slice(rows.start.max(0) as usize, rows.slicelength as usize);
+        Ok(Self { schema: self.schema.clone(), batch })
     }
 
     fn column_index(&self, name: &str) -> PyResult<usize> {
@@ -126,11 +151,64 @@ impl Table {
         Ok(dict)
     }
 
-    /// The values of a column as a NumPy array. Missing numbers are NaN, and the array is float64 then; text and
-    /// truth values are an array of objects, None where they are missing.
-    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let position = self.column_index(name)?;
-        to_numpy_column(py, self.batch.column(position), self.schema.columns[position].ty)
+    /// The values of a column as a NumPy array, by its name. Missing numbers are NaN, and the array is float64 then; text
+    /// and truth values are an array of objects, None where they are missing. By a list of names the table of these columns,
+    /// and by a slice that of these rows.
+    fn __getitem__<'py>(
+        &self,
+        py: Python<'py>,
+        key: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if let Ok(name) = key.extract::<String>() {
+            let position = self.column_index(&name)?;
+            let ty = self.schema.columns[position].ty;
+            return to_numpy_column(py, self.batch.column(position), ty);
+        }
+        if let Ok(slice) = key.cast::<PySlice>() {
+            return self.slice(slice)?.into_bound_py_any(py);
+        }
+        if let Ok(names) = key.extract::<Vec<String>>() {
+            return self.select(names)?.into_bound_py_any(py);
+        }
+        let what = key.get_type().name()?;
+        let remedy = "give the name of a column, a list of names, or a slice of rows; `head` has rows as tuples";
+        Err(PyTypeError::new_err(format!("a table has no item of the type {what}\n  help: {remedy}")))
+    }
+
+    /// The names of the columns: `dict(table)` has all of them.
+    fn keys(&self) -> Vec<&str> {
+        self.columns()
+    }
+
+    /// Iterates over the names of the columns, as data frames do.
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        PyList::new(py, self.columns())?.into_any().call_method0("__iter__")
+    }
+
+    /// The rows as a structured array of NumPy, with a field for each column.
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__<'py>(
+        &self,
+        py: Python<'py>,
+        dtype: Option<Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if copy == Some(false) {
+            let cause = "rows of a table are columns in memory, so that an array of rows is a copy";
+            return Err(PyValueError::new_err(format!("{cause}\n  help: leave copy=False out")));
+        }
+        let mut arrays = Vec::with_capacity(self.schema.columns.len());
+        for (array, spec) in self.batch.columns().iter().zip(&self.schema.columns) {
+            arrays.push(to_numpy_column(py, array, spec.ty)?);
+        }
+        let names = PyDict::new(py);
+        names.set_item("names", self.columns())?;
+        let records = py.import("numpy")?.getattr("rec")?;
+        let rows = records.call_method("fromarrays", (arrays,), Some(&names))?;
+        match dtype {
+            Some(dtype) => rows.call_method1("astype", (dtype,)),
+            None => Ok(rows),
+        }
     }
 
     /// Returns the same rows with only these columns, in this order; nothing is copied.
@@ -145,6 +223,17 @@ impl Table {
         let batch = self.batch.project(&places).map_err(|e| arrow_error(&e))?;
         let specs = places.iter().map(|&k| self.schema.columns[k].clone()).collect();
         Ok(Self { schema: TableSchema { columns: specs, ..self.schema.clone() }, batch })
+    }
+
+    /// Pickles all rows: a task of a process pool returns what it recorded.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<(String, String)>, Bound<'py, PyBytes>))> {
+        let rows = pickle::arrow_bytes(&self.batch).map_err(|e| arrow_error(&e))?;
+        let TableSchema { name, about, .. } = &self.schema;
+        let values = (name.clone(), about.clone(), PyBytes::new(py, &rows));
+        Ok((pickle::maker(py, "unpack_table")?, values))
     }
 
     fn __contains__(&self, name: &str) -> bool {
@@ -248,6 +337,32 @@ fn field(spec: &ColumnSpec) -> Field {
     let meaning = ("meaning".to_string(), spec.meaning.clone());
     let about: HashMap<_, _> = [Some(meaning), unit].into_iter().flatten().collect();
     Field::new(&spec.name, ty, spec.is_nullable).with_metadata(about)
+}
+
+/// Returns the specification of a column from its field and its values.
+fn spec(field: &Field, array: &ArrayRef) -> Result<ColumnSpec, String> {
+    let ty = match field.data_type() {
+        DataType::UInt32 => ColumnType::U32,
+        DataType::UInt64 => ColumnType::U64,
+        DataType::Int32 => ColumnType::I32,
+        DataType::Int64 => ColumnType::I64,
+        DataType::Float64 => ColumnType::F64,
+        DataType::Boolean => ColumnType::Bool,
+        DataType::Utf8 => ColumnType::Text,
+        DataType::Dictionary(..) => ColumnType::Label,
+        other => return Err(format!("column `{}` has the type {other}", field.name())),
+    };
+    let mut labels = Vec::new();
+    if let Some(dictionary) = array.as_dictionary_opt::<UInt32Type>() {
+        let names = dictionary.values().as_string::<i32>();
+        labels.extend(names.iter().map(|name| name.unwrap_or_default().to_string()));
+    }
+    let meaning = field.metadata().get("meaning").map_or("", String::as_str);
+    Ok(ColumnSpec {
+        labels,
+        is_nullable: field.is_nullable(),
+        ..ColumnSpec::new(field.name(), ty, meaning)
+    })
 }
 
 fn array(spec: &ColumnSpec, values: ColumnValues) -> Result<ArrayRef, ArrowError> {

@@ -378,3 +378,19 @@ def test_numbers_out_of_range_are_told_with_the_range(urdf):
     ]:
         with pytest.raises(sidestep.InputError, match=words):
             call()
+
+
+def test_joints_of_a_table_are_found_by_their_names_whatever_their_order() -> None:
+    arm = sidestep.Arm("scenarios/chain/arm.urdf")
+    values = np.linspace(0.1, 0.4, 3 * len(arm.joints)).reshape(3, -1)
+    by_name = {joint: values[:, k] for k, joint in reversed(list(enumerate(arm.joints)))}
+    expected = sidestep.fk(arm, values).tip
+    assert np.array_equal(sidestep.fk(arm, by_name).tip, expected)
+    pandas = pytest.importorskip("pandas")
+    assert np.array_equal(sidestep.fk(arm, pandas.DataFrame(by_name)).tip, expected)
+    assert np.array_equal(
+        sidestep.fk(arm, pandas.Series({k: v[0] for k, v in by_name.items()}).to_dict()).tip, expected[:1]
+    )
+    del by_name[arm.joints[1]]
+    with pytest.raises(sidestep.InputError, match=f"no column `{arm.joints[1]}`"):
+        sidestep.fk(arm, by_name)

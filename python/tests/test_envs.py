@@ -200,3 +200,14 @@ def test_it_is_drawn(make):
     env.reset(seed=1)
     assert env.render().shape[1:] == (160, 3)
     assert make().render() is None
+
+
+def test_a_critic_that_sees_all_has_the_space_of_what_it_sees(make):
+    from pettingzoo.test.state_test import state_test
+
+    state_test(parallel_to_aec(make()), make())
+    env = make()
+    first = env.state()
+    assert env.state_space.contains(first), "before the first reset, too"
+    env.reset(seed=1)
+    assert env.state().shape == first.shape == env.state_space.shape

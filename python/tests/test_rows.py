@@ -2,6 +2,7 @@
 
 import os
 
+import numpy as np
 import pytest
 
 import sidestep
@@ -163,3 +164,29 @@ def test_the_first_rows_are_pythons_own_values(external):
     assert all(isinstance(row[-1], str) for row in first)
     assert tables["events"].head(0) == []
     assert len(tables["trajectories"].head(10**6)) == 140
+
+
+def test_a_table_is_sliced_selected_and_turned_into_what_others_use() -> None:
+    sim = sidestep.Simulation(
+        {"world": "robots", "cycles": 9, "map": {"ascii": "....."}, "robots": [{"count": 2}]}, record=True
+    )
+    sim.run()
+    table = sim.tables()["trajectories"]
+    assert table[2:5]["cycle"].tolist() == table["cycle"][2:5].tolist()
+    assert table[-3:].head() == table.head(len(table))[-3:]
+    assert (len(table[5:2]), len(table[:0]), len(table[:])) == (0, 0, len(table))
+    assert table[["body", "cycle"]].columns == ["body", "cycle"]
+    assert list(table) == table.columns
+    assert {name: values.tolist() for name, values in dict(table).items()} == {
+        name: table[name].tolist() for name in table.columns
+    }
+    rows = np.asarray(table)
+    assert rows.dtype.names == tuple(table.columns) and rows["cycle"].tolist() == table["cycle"].tolist()
+    with pytest.raises(TypeError, match="head"):
+        table[0]  # type: ignore[call-overload]
+    with pytest.raises(ValueError, match="step"):
+        table[::2]
+    with pytest.raises(KeyError, match="no column `cylce`"):
+        table[["cylce"]]
+    pandas = pytest.importorskip("pandas")
+    assert pandas.DataFrame(table)["cycle"].tolist() == table["cycle"].tolist()

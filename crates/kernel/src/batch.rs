@@ -230,6 +230,28 @@ impl Batch {
         self.take_first_error(|index| seeds[index].is_some()).map_or(Ok(()), Err)
     }
 
+    /// Continues each world from a checkpoint of the same scenario, one for each; queued orders are dropped.
+    ///
+    /// # Errors
+    /// When a checkpoint is damaged, or of another scenario or build: that world stays as it was, and all others continue
+    /// from theirs.
+    pub fn restore(&mut self, checkpoints: &[Vec<u8>]) -> Result<(), BatchError> {
+        self.check_world_count(Some(checkpoints.len()), "checkpoints")?;
+        self.orders.clear();
+        let mut first = None;
+        for (index, checkpoint) in checkpoints.iter().enumerate() {
+            let mut world = self.world(index);
+            let Some(run) = world.run.as_deref_mut() else {
+                first = first.or(Some(world.broken_world_error(index)));
+                continue;
+            };
+            if let Err(error) = run.restore(checkpoint) {
+                first = first.or(Some(BatchError::Restore { world: index, error }));
+            }
+        }
+        first.map_or(Ok(()), Err)
+    }
+
     /// Returns the seed with which each world last started.
     pub fn seeds(&self) -> Vec<u64> {
         (0..self.len()).map(|k| self.world(k).seed).collect()

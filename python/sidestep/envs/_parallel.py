@@ -189,8 +189,21 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
             {agent: {} for agent in agents},
         )
 
+    @property
+    def state_space(self) -> spaces.Box:
+        """The space of :meth:`state`: the observations of all agents as one vector, for a critic that sees all."""
+        lows, highs = [], []
+        for _, team in self._teams:
+            for space in team.observation_spaces:
+                count = len(team.agents) * int(np.prod(space.shape))
+                lows.append(np.full(count, space.low, np.float32))
+                highs.append(np.full(count, space.high, np.float32))
+        return spaces.Box(np.concatenate(lows), np.concatenate(highs), dtype=np.float32)
+
     def state(self) -> NDArray[np.float32]:
-        """Returns the observations of all agents as one vector."""
+        """Returns the observations of all agents as one vector; before the first ``reset``, those of the scenario's start."""
+        if not self._before:
+            self._before = self._observed()
         parts = [array.ravel() for team in self._before for array in team.values()]
         return np.concatenate(parts).astype(np.float32)
 

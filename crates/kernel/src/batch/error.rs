@@ -1,5 +1,6 @@
 //! Reasons why a batch could not do something.
 
+use crate::checkpoint::CheckpointError;
 use crate::control::OrderError;
 use crate::error::InputError;
 use crate::units::Cycle;
@@ -30,6 +31,14 @@ pub enum BatchError {
         seed: u64,
         /// The error of the factory.
         error: InputError,
+    },
+    /// A checkpoint that a world cannot continue from.
+    #[error("world {world} cannot continue from its checkpoint: {error}")]
+    Restore {
+        /// Its index in the batch.
+        world: usize,
+        /// The reason.
+        error: CheckpointError,
     },
     /// A world with agents that observe, or are ordered, differently from those of the first.
     #[error("world {world} has other teams than world 0; a batch is of worlds of one shape")]
