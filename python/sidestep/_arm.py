@@ -126,7 +126,12 @@ def _in_order(name: str, joints: Sequence[str], values: ArrayLike | Mapping[str,
         cause = f"there is no column `{missing[0]}` among {', '.join(known)}"
         raise input_error(name, cause, "name the columns by `arm.joints`, or give an array in their order")
     named = cast(Any, values)
-    return np.stack([np.atleast_1d(np.asarray(named[joint], np.float64)) for joint in joints], axis=-1)
+    rows = [_rows(f"{name}.{joint}", named[joint])[0] for joint in joints]
+    lengths = {joint: len(row) for joint, row in zip(joints, rows, strict=True)}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{joint} has {length}" for joint, length in lengths.items())
+        raise input_error(name, f"their lengths differ: {listed}", "give one value of each joint per row")
+    return np.stack(rows, axis=-1)
 
 
 def ik(

@@ -277,10 +277,7 @@ impl Arm {
     }
 
     /// Pickles the arm with the texts of its files; meshes that these name are taken from their places.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (ArmSource,))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (ArmSource,))> {
         Ok((pickle::maker(py, "unpack_arm")?, (self.source.clone(),)))
     }
 

@@ -155,13 +155,16 @@ fn batch_error(error: &BatchError) -> PyErr {
         BatchError::Empty | BatchError::Shape { .. } => {
             argument_error("worlds", error.to_string(), "give worlds of one scenario, at least one")
         }
+        BatchError::Restore { .. } | BatchError::Count { what: "checkpoints", .. } => {
+            argument_error("states", error.to_string(), "pickle the batch again, with this build")
+        }
         BatchError::Broken { .. } => error::ReplayError::new_err(error.to_string()),
         _ => error::OrderError::new_err(error.to_string()),
     }
 }
 
-/// Returns the function that creates a world at its start. All seeds share one text: it only identifies checkpoints, and a
-/// batch makes none.
+/// Returns the function that creates a world at its start. All seeds share one text: it identifies the checkpoints by which
+/// a batch is pickled, each of which has the seed of its world in its state.
 fn start_function(scenario: &Arc<LoadedScenario>) -> PyResult<Arc<SimulationFactory>> {
     let source = Source::new("scenario.toml", scenario.identity()?, "");
     let scenario = Arc::clone(scenario);

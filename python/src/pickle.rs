@@ -11,9 +11,10 @@ use arrow_ipc::reader::StreamReader;
 use arrow_ipc::writer::StreamWriter;
 use arrow_schema::ArrowError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use sidestep::arms::kinematics::ArmFiles;
 use sidestep::kernel::control::{AgentTeam, ValueDomain, ValueSpace};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Returns a function of the native module, by which a class is made again.
@@ -84,15 +85,29 @@ pub(crate) fn arrow_bytes(batch: &RecordBatch) -> Result<Vec<u8>, ArrowError> {
     writer.into_inner()
 }
 
+/// Returns a checksum: readers of Arrow's format trust lengths, and end the program where these are damaged.
+pub(crate) fn checksum(rows: &Bound<'_, PyBytes>) -> PyResult<u32> {
+    rows.py().import("zlib")?.call_method1("crc32", (rows,))?.extract()
+}
+
 /// Makes a table again.
 ///
 /// Raises InputError when the bytes are damaged.
 #[pyfunction]
-pub(crate) fn unpack_table(name: String, about: Vec<(String, String)>, rows: &[u8]) -> PyResult<Table> {
+pub(crate) fn unpack_table(
+    name: String,
+    about: Vec<(String, String)>,
+    rows: &Bound<'_, PyBytes>,
+    expected: u32,
+) -> PyResult<Table> {
     let damaged = |cause: String| {
         argument_error("rows", cause, "give the bytes that a pickle of a table holds, unchanged")
     };
-    let mut reader = StreamReader::try_new(rows, None).map_err(|e| damaged(e.to_string()))?;
+    if checksum(rows)? != expected {
+        return Err(damaged("they do not have their checksum".into()));
+    }
+    let mut reader =
+        StreamReader::try_new(rows.as_bytes(), None).map_err(|e| damaged(e.to_string()))?;
     let batch = reader.next().ok_or_else(|| damaged("they hold no rows".into()))?;
     Table::from_arrow(name, about, batch.map_err(|e| damaged(e.to_string()))?).map_err(damaged)
 }
@@ -120,16 +135,15 @@ pub(crate) fn unpack_arm(source: ArmSource) -> PyResult<Arm> {
         return Arm::load(source);
     }
     let folder = tempfile::tempdir().map_err(|e| error::RecordError::new_err(e.to_string()))?;
-    let copy = |(path, text): &(PathBuf, String)| -> PyResult<PathBuf> {
-        let name = path.file_name().map_or(Path::new("arm"), Path::new);
+    let copy = |name: &str, text: &str| -> PyResult<PathBuf> {
         let copy = folder.path().join(name);
         let written = std::fs::write(&copy, text);
         written.map_err(|e| error::RecordError::new_err(format!("{}: {e}", copy.display())))?;
         Ok(copy)
     };
     let files = ArmFiles {
-        urdf: copy(&source.urdf)?,
-        srdf: source.srdf.as_ref().map(copy).transpose()?,
+        urdf: copy("arm.urdf", &source.urdf.1)?,
+        srdf: source.srdf.as_ref().map(|(_, text)| copy("arm.srdf", text)).transpose()?,
         base: source.base.clone(),
         tip: source.tip.clone(),
         group: source.group.clone(),

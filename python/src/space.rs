@@ -151,10 +151,8 @@ impl Team {
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
-    ) -> PyResult<(
-        Bound<'py, PyAny>,
-        (String, Vec<u32>, Bound<'py, PyList>, Bound<'py, PyList>),
-    )> {
+    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<u32>, Bound<'py, PyList>, Bound<'py, PyList>))>
+    {
         let values = (
             self.0.name.clone(),
             self.0.agents.clone(),

@@ -172,7 +172,9 @@ impl Table {
         }
         let what = key.get_type().name()?;
         let remedy = "give the name of a column, a list of names, or a slice of rows; `head` has rows as tuples";
-        Err(PyTypeError::new_err(format!("a table has no item of the type {what}\n  help: {remedy}")))
+        Err(PyTypeError::new_err(format!(
+            "a table has no item of the type {what}\n  help: {remedy}"
+        )))
     }
 
     /// The names of the columns: `dict(table)` has all of them.
@@ -226,13 +228,12 @@ impl Table {
     }
 
     /// Pickles all rows: a task of a process pool returns what it recorded.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<(String, String)>, Bound<'py, PyBytes>))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledTable<'py>)> {
         let rows = pickle::arrow_bytes(&self.batch).map_err(|e| arrow_error(&e))?;
+        let rows = PyBytes::new(py, &rows);
+        let checksum = pickle::checksum(&rows)?;
         let TableSchema { name, about, .. } = &self.schema;
-        let values = (name.clone(), about.clone(), PyBytes::new(py, &rows));
+        let values = (name.clone(), about.clone(), rows, checksum);
         Ok((pickle::maker(py, "unpack_table")?, values))
     }
 
@@ -297,6 +298,9 @@ impl Table {
     }
 }
 
+/// The arguments of [`pickle::unpack_table`].
+type PickledTable<'py> = (String, Vec<(String, String)>, Bound<'py, PyBytes>, u32);
+
 /// Returns one sentence about a column of a table of runs.
 fn column_description(column: &RunColumn, infos: &[MetricInfo]) -> String {
     let description = match column.role {
@@ -349,7 +353,11 @@ fn spec(field: &Field, array: &ArrayRef) -> Result<ColumnSpec, String> {
         DataType::Float64 => ColumnType::F64,
         DataType::Boolean => ColumnType::Bool,
         DataType::Utf8 => ColumnType::Text,
-        DataType::Dictionary(..) => ColumnType::Label,
+        DataType::Dictionary(keys, values)
+            if **keys == DataType::UInt32 && **values == DataType::Utf8 =>
+        {
+            ColumnType::Label
+        }
         other => return Err(format!("column `{}` has the type {other}", field.name())),
     };
     let mut labels = Vec::new();

@@ -391,6 +391,9 @@ def test_joints_of_a_table_are_found_by_their_names_whatever_their_order() -> No
     assert np.array_equal(
         sidestep.fk(arm, pandas.Series({k: v[0] for k, v in by_name.items()}).to_dict()).tip, expected[:1]
     )
+    for wrong, words in ((values[:2, 1], "lengths differ"), (["a", "b", "c"], "not numbers")):
+        with pytest.raises(sidestep.InputError, match=words):
+            sidestep.fk(arm, {**by_name, arm.joints[1]: wrong})
     del by_name[arm.joints[1]]
     with pytest.raises(sidestep.InputError, match=f"no column `{arm.joints[1]}`"):
         sidestep.fk(arm, by_name)

@@ -62,10 +62,20 @@ def test_a_task_of_a_process_pool_returns_what_it_recorded() -> None:
 
 
 def test_damaged_rows_are_told() -> None:
-    maker, (name, about, rows) = recorded(1)["events"].__reduce__()  # type: ignore[misc]
-    for damaged in (b"", rows[:40], b"junk" * 20):
+    maker, (name, about, rows, checksum) = recorded(1)["events"].__reduce__()  # type: ignore[misc]
+    assert equal(maker(name, about, rows, checksum), recorded(1)["events"])
+    cut = [rows[:length] for length in range(0, len(rows), 97)]
+    flipped = [rows[:at] + bytes([rows[at] ^ 0x40]) + rows[at + 1 :] for at in range(0, len(rows), 97)]
+    for damaged in [*cut, *flipped, b"junk" * 20]:
         with pytest.raises(sidestep.InputError, match="unchanged"):
-            maker(name, about, damaged)
+            maker(name, about, damaged, checksum)
+
+
+def test_a_state_that_a_batch_cannot_continue_from_is_told() -> None:
+    maker, (scenario, seeds, workers, states) = sidestep.Batch(FLOOR, 2).__reduce__()  # type: ignore[misc]
+    for wrong in ([states[0], states[1][:-3]], [states[0], b"junk"], states[:1]):
+        with pytest.raises(sidestep.InputError, match="states"):
+            maker(scenario, seeds, workers, wrong)
 
 
 @how

@@ -128,7 +128,7 @@ fn axis(scale: Scale, label: &str) -> Axis {
 fn plot(figure: &Figure, mark: Mark) -> Plot {
     let mut x_axis = axis(figure.x_scale, &figure.x_label);
     if mark == Mark::Line
-        && let Some(levels) = few_levels(&figure.series)
+        && let Some(levels) = few_levels(&figure.series, figure.x_scale)
     {
         x_axis = x_axis.ticks(levels);
     }
@@ -144,7 +144,7 @@ fn plot(figure: &Figure, mark: Mark) -> Plot {
     let SeriesLooks { looks, legend } = SeriesLooks::new(&figure.series);
     for (series, mut look) in figure.series.iter().zip(looks) {
         // Steps of several series lie over each other where these begin and end.
-        if mark == Mark::Steps {
+        if mark == Mark::Steps && legend.len() < 2 {
             look.dash = look.color;
         }
         plot = plot.series(sidestep_draw::Series {
@@ -185,13 +185,18 @@ fn band_axes(figure: &Figure, x_axis: Axis, y_axis: Axis) -> (Axis, Axis) {
 
 /// Largest number of levels that all have a tick.
 const MAX_LEVEL_TICKS: usize = 7;
+/// Least distance of two of them as a fraction of a linear axis, least ratio on a logarithmic one, and the longest label:
+/// else they would lie over each other.
+const MIN_TICK_GAP: f64 = 0.09;
+const MIN_TICK_RATIO: f64 = 1.5;
+const MAX_TICK_CHARS: usize = 5;
 
 /// Returns the places of points along the horizontal axis in rising order, if these are few levels of all series: a reader
 /// sees where was measured.
-fn few_levels(series: &[Series]) -> Option<Vec<f64>> {
+fn few_levels(series: &[Series], scale: Scale) -> Option<Vec<f64>> {
     let mut levels: Vec<f64> = Vec::new();
     for x in series.iter().flat_map(|series| &series.points).map(|point| point.x) {
-        if !levels.contains(&x) {
+        if x.is_finite() && !levels.contains(&x) {
             levels.push(x);
         }
         if levels.len() > MAX_LEVEL_TICKS {
@@ -199,7 +204,14 @@ fn few_levels(series: &[Series]) -> Option<Vec<f64>> {
         }
     }
     levels.sort_by(f64::total_cmp);
-    (levels.len() > 1).then_some(levels)
+    let [first, .., last] = levels[..] else { return None };
+    let are_apart = levels.windows(2).all(|pair| match scale {
+        Scale::Linear => pair[1] - pair[0] >= MIN_TICK_GAP * (last - first),
+        Scale::Log => pair[1] >= MIN_TICK_RATIO * pair[0],
+    });
+    // Thirds have more digits than an axis has room for.
+    let are_short = levels.iter().all(|x| x.to_string().len() <= MAX_TICK_CHARS);
+    (are_apart && are_short).then_some(levels)
 }
 
 fn point(p: &Point) -> sidestep_draw::Point {
@@ -245,6 +257,7 @@ fn bars(figure: &Figure, categories: &[String]) -> BarChart {
     let mut chart = BarChart::new(&figure.title, categories)
         .x_label(&figure.x_label)
         .y_axis(axis(figure.y_scale, &figure.y_label))
+        .interval_label(&figure.interval_words)
         .note(&figure.note);
     for series in &figure.series {
         let bars = (0..categories.len()).map(|k| bar_at(&series.points, k)).collect();

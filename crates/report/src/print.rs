@@ -131,17 +131,19 @@ impl PrintStyle {
         let mut figure = Figure { title: String::new(), note: String::new(), ..figure.clone() };
         // Without its note, the legend says what is shown.
         let runs = figure.runs_words().map(|words| format!(", {words}")).unwrap_or_default();
-        if figure.has_intervals() && !matches!(figure.kind, FigureKind::Forest { .. }) {
-            figure.interval_words = self.label(INTERVAL_WORDS) + &runs;
+        if let Some(words) = interval_words(&figure) {
+            figure.interval_words = self.label(words) + &runs;
         }
         for label in [&mut figure.x_label, &mut figure.y_label] {
-            *label = self.label_or_words(label);
+            let own = self.label(label);
+            *label = if own == *label { key_words(label) } else { own };
         }
-        for series in &mut figure.series {
-            series.name = self.label_or_words(&series.name);
+        let names = self.names(figure.series.iter().map(|series| series.name.as_str()).collect());
+        for (series, name) in figure.series.iter_mut().zip(names) {
+            series.name = name;
         }
         for name in figure.position_names_mut() {
-            *name = self.label_or_words(name);
+            *name = self.label(name);
         }
         if let FigureKind::Runs { legend, .. } = &mut figure.kind {
             legend.seed = self.label(&legend.seed);
@@ -156,33 +158,60 @@ impl PrintStyle {
         own.map_or(label, |(_, to)| to).to_string()
     }
 
-    /// Returns the author's words for a label, or else its own, where it is a key of the scenario.
-    fn label_or_words(&self, label: &str) -> String {
-        let own = self.label(label);
-        if own == label { key_words(label) } else { own }
+    /// Returns the author's words for names of series, or else their own, in which keys are told in words.
+    fn names(&self, names: Vec<&str>) -> Vec<String> {
+        let in_words: Vec<String> = names.iter().map(|name| level_words(name)).collect();
+        let count = |words: Vec<&str>| words.into_iter().collect::<BTreeSet<_>>().len();
+        // Two names that would become one are left as they are.
+        let is_distinct =
+            count(in_words.iter().map(String::as_str).collect()) == count(names.clone());
+        let words = |(name, words): (&str, String)| {
+            let own = self.label(name);
+            if own == name && is_distinct { words } else { own }
+        };
+        names.into_iter().zip(in_words).map(words).collect()
     }
 }
 
-/// What the legend says of means.
-const INTERVAL_WORDS: &str = "mean, 95 % interval";
+/// Returns what a legend says of the intervals of a figure; `None` where it has none that a legend explains.
+fn interval_words(figure: &Figure) -> Option<&'static str> {
+    let words = match figure.kind {
+        FigureKind::Steps => "95 % interval",
+        FigureKind::Runs { .. } | FigureKind::Forest { .. } | FigureKind::Heat { .. } => {
+            return None;
+        }
+        _ => "mean, 95 % interval",
+    };
+    figure.has_intervals().then_some(words)
+}
 
-/// Returns the words of a key, as `robots.0.count` is the number of robots, and those of levels of factors; other labels
-/// stay.
+/// Returns the words of a label of an axis, where it is a key: `robots.0.count` is the number of robots. Others stay.
 fn key_words(label: &str) -> String {
     let (key, unit) = match label.split_once(" (") {
         Some((key, unit)) => (key, format!(" ({unit}")),
         None => (label, String::new()),
     };
-    if !key.contains([' ', '=']) && key.starts_with(char::is_alphabetic) {
-        return words_of_key(key) + &unit;
+    if key.contains([' ', '=']) || !key.starts_with(char::is_alphabetic) {
+        return label.to_string();
     }
-    let word = |part: &str| match part.split_once('=') {
-        Some((key, value)) => {
-            format!("{}={}", words_of_key(key.trim()), value.trim().replace('_', " "))
-        }
-        None => part.to_string(),
+    words_of_key(key) + &unit
+}
+
+/// Returns the name of a variant with its keys in words: `conflict_policy=right_of_way` is "conflict policy=right of way".
+/// Names that are no levels of factors stay, and so do those of which two keys would become one.
+fn level_words(name: &str) -> String {
+    let parts = name.split(", ").map(|part| part.split_once('='));
+    let Some(levels) = parts.collect::<Option<Vec<(&str, &str)>>>() else {
+        return name.to_string();
     };
-    label.split(", ").map(word).collect::<Vec<_>>().join(", ")
+    let keys: BTreeSet<String> = levels.iter().map(|(key, _)| words_of_key(key.trim())).collect();
+    if keys.len() < levels.len() {
+        return name.to_string();
+    }
+    let words = levels.iter().map(|(key, value)| {
+        format!("{}={}", words_of_key(key.trim()), value.trim().replace('_', " "))
+    });
+    words.collect::<Vec<_>>().join(", ")
 }
 
 fn words_of_key(key: &str) -> String {
@@ -206,7 +235,8 @@ fn figure_labels(figure: &Figure) -> impl Iterator<Item = &str> {
     let positions = figure.position_names().unwrap_or_default();
     let series = figure.series.iter().map(|series| &series.name);
     let axes = [&figure.x_label, &figure.y_label].into_iter();
-    axes.chain(series).chain(positions).chain(figure.legend_words()).map(String::as_str)
+    let words = axes.chain(series).chain(positions).chain(figure.legend_words());
+    words.map(String::as_str).chain(interval_words(figure))
 }
 
 /// Returns a drawing that is shown larger by a factor, with all its lines.
@@ -267,20 +297,30 @@ mod tests {
     }
 
     #[test]
-    fn keys_and_levels_are_told_in_words_and_other_labels_stay() {
-        let told = [
+    fn keys_are_told_in_words_and_the_authors_own_names_stay() {
+        let axes = [
             ("robots.0.count", "number of robots"),
             ("airspace.method", "method"),
             ("ground.corridor.width (m)", "width (m)"),
-            ("conflict_policy = right_of_way", "conflict policy=right of way"),
-            ("count=6, conflict_policy=random", "count=6, conflict policy=random"),
             ("closest approach (m)", "closest approach (m)"),
             ("0.5", "0.5"),
-            ("1.5x", "1.5x"),
             ("", ""),
         ];
-        for (label, words) in told {
+        for (label, words) in axes {
             assert_eq!(key_words(label), words);
         }
+        let names = [
+            ("conflict_policy = right_of_way", "conflict policy=right of way"),
+            ("count=6, conflict_policy=random", "count=6, conflict policy=random"),
+            ("robots.0.speed=1, robots.1.speed=2", "robots.0.speed=1, robots.1.speed=2"),
+            ("office.toml", "office.toml"),
+            ("fast_v1.5", "fast_v1.5"),
+        ];
+        for (name, words) in names {
+            assert_eq!(level_words(name), words);
+        }
+        let look = FigureLook::Paper;
+        let print = PrintStyle { look, size_mm: [85.0, 60.0], font_pt: 8.0, labels: vec![] };
+        assert_eq!(print.names(vec!["a_b=1", "a b=1"]), ["a_b=1", "a b=1"], "still two names");
     }
 }

@@ -2,7 +2,7 @@
 //! of the others.
 
 use sidestep_document::Series;
-use sidestep_draw::{LegendGroup, LegendLook, SeriesLook};
+use sidestep_draw::{LegendGroup, LegendLook, SeriesLook, series_colors};
 
 /// Maximum number of dashes that can be told apart.
 const MAX_PATTERNS: usize = 4;
@@ -39,21 +39,25 @@ impl SeriesLooks {
             let values: Vec<&str> = levels[1..].iter().map(|(_, value)| *value).collect();
             values.join(", ")
         }));
-        let own_look = |number: usize| LegendLook { color: Some(number), pattern: Some(number) };
+        let own_look = |number: usize| {
+            let SeriesLook { color, marker, dash } = SeriesLook::of_series(number);
+            LegendLook { color: Some(color), marker: Some(marker), dash }
+        };
         if factors.len() == 1 {
             let looks = first.numbers.iter().map(|number| SeriesLook::of_series(*number)).collect();
             let legend = vec![first.into_group(factors[0], own_look)];
             return Some(Self { looks, legend });
         }
-        if others.words.len() > MAX_PATTERNS {
+        if others.words.len() > MAX_PATTERNS || first.words.len() > series_colors().len() {
             return None;
         }
         let pairs = first.numbers.iter().zip(&others.numbers);
         let looks = pairs
             .map(|(&color, &pattern)| SeriesLook { color, marker: pattern, dash: pattern })
             .collect();
-        let color = |number: usize| LegendLook { color: Some(number), pattern: None };
-        let pattern = |number: usize| LegendLook { color: None, pattern: Some(number) };
+        let color = |number: usize| LegendLook { color: Some(number), marker: None, dash: 0 };
+        let pattern =
+            |number: usize| LegendLook { color: None, marker: Some(number), dash: number };
         let legend = vec![
             first.into_group(factors[0], color),
             others.into_group(&factors[1..].join(", "), pattern),
@@ -120,8 +124,8 @@ mod tests {
         let [colors, patterns] = &found.legend[..] else { panic!("two groups") };
         assert_eq!((colors.heading.as_str(), labels(colors)), ("n", vec!["6", "12"]));
         assert_eq!((patterns.heading.as_str(), labels(patterns)), ("rule", vec!["a", "b"]));
-        assert_eq!(colors.entries[1].0, LegendLook { color: Some(1), pattern: None });
-        assert_eq!(patterns.entries[1].0, LegendLook { color: None, pattern: Some(1) });
+        assert_eq!(colors.entries[1].0, LegendLook { color: Some(1), marker: None, dash: 0 });
+        assert_eq!(patterns.entries[1].0, LegendLook { color: None, marker: Some(1), dash: 1 });
     }
 
     #[test]
@@ -129,6 +133,9 @@ mod tests {
         let found = looks(&["n = 6", "n = 12"]);
         assert_eq!(labels(&found.legend[0]), ["6", "12"]);
         assert_eq!(found.looks[1], SeriesLook::of_series(1));
+        // A legend shows what is drawn: a whole line.
+        let shown = LegendLook { color: Some(1), marker: Some(1), dash: 0 };
+        assert_eq!(found.legend[0].entries[1].0, shown);
         let many: Vec<String> = (0..6).map(|k| format!("n=1, rule={k}")).collect();
         let many: Vec<&str> = many.iter().map(String::as_str).collect();
         for names in [&["mvp", "pc"][..], &["n=6", "rule=a"], &["n=6", "pc"], &["n=6"], &[], &many]

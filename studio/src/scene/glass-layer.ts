@@ -13,6 +13,7 @@ import {
   Vector2,
   WebGLRenderTarget,
   type Camera,
+  type RawShaderMaterial,
   type WebGLRenderer,
 } from "three";
 import { material } from "./material";
@@ -33,6 +34,7 @@ void main() { color = texelFetch(image, ivec2(gl_FragCoord.xy), 0); }`;
 export class GlassLayer {
   /** What shows the image of the bodies. */
   readonly mesh: Mesh;
+  readonly #look: RawShaderMaterial;
   readonly #bodies = new Graph();
   readonly #target = new WebGLRenderTarget(1, 1, { samples: SAMPLES, depthBuffer: false });
   /** The view of the present image. */
@@ -41,7 +43,13 @@ export class GlassLayer {
   constructor(bodies: Group) {
     this.#bodies.add(bodies);
     const uniforms = { image: { value: this.#target.texture } };
-    const look = material({ vertex: VERTEX, fragment: FRAGMENT, uniforms, depth: true, transparent: true });
+    const look = (this.#look = material({
+      vertex: VERTEX,
+      fragment: FRAGMENT,
+      uniforms,
+      depth: true,
+      transparent: true,
+    }));
     // The image of things that shine through each other has their colors multiplied already.
     look.premultipliedAlpha = true;
     const triangle = new BufferGeometry();
@@ -74,6 +82,7 @@ export class GlassLayer {
   }
 
   dispose(): void {
+    this.#look.dispose();
     this.#target.dispose();
     this.mesh.geometry.dispose();
   }

@@ -191,6 +191,7 @@ export class Viewport {
     this.#extent = extentOf(scene, null, null);
     this.setTheme(isDark);
     this.#takeGlass();
+    canvas.addEventListener("webglcontextrestored", () => this.#glass?.invalidate());
   }
 
   /** Draws glass bodies apart, where the painter wants it. */

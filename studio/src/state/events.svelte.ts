@@ -40,6 +40,8 @@ export class Events {
 
   clear(): void {
     this.#waiting = [];
+    if (this.#timer !== null) clearTimeout(this.#timer);
+    this.#timer = null;
     this.list = [];
     this.kinds = new Map();
     this.leftOut = 0;
@@ -149,6 +151,7 @@ export class Events {
 
   /** The first visible event after a cycle, or the last one before it. */
   neighbor(cycle: number, direction: 1 | -1): RunEvent | undefined {
+    this.#addWaiting();
     if (direction > 0) return this.visible.find((event) => event.cycle > cycle);
     return this.visible.findLast((event) => event.cycle < cycle);
   }

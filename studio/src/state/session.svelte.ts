@@ -5,7 +5,7 @@
 
 import { linksBetweenBodies, type Link } from "../fleet/links";
 import { initialSpeed } from "../format";
-import type { BodyTable, OpenTarget, Problem, ReplyBody, RunEvent, SessionStatus } from "../protocol";
+import type { BodyTable, OpenTarget, Problem, ReplyBody, RunEvent, SessionStatus, Speed } from "../protocol";
 import { AgentMetrics } from "./agent-metrics.svelte";
 import { metricOf } from "./color-mode";
 import { Display } from "./display.svelte";
@@ -93,7 +93,7 @@ export class Session {
   onOpened(answer: Opened): void {
     this.client.id = answer.session;
     const isFirst = this.run.starts === 0;
-    if (isFirst) this.playback.speed = { times: initialSpeed(answer.scene.cycle_s) };
+    if (isFirst) this.playback.speed = firstSpeed(answer, this.isReplay);
     this.#onStart(answer);
     this.frames.credit.reset();
     this.frames.credit.refill();
@@ -213,6 +213,7 @@ export class Session {
 
   /** The page has closed it: pending requests no longer matter. */
   dispose(): void {
+    this.events.clear();
     this.client.sendQuietly({ do: "close" });
     this.playback.interrupt();
     this.client.id = 0;
@@ -239,4 +240,11 @@ export class Session {
     this.playback.cancel();
     this.frames.cancelWaits();
   }
+}
+
+/** The speed at which a session opens: of a replay that of its file, with which a run is over within a minute. */
+function firstSpeed({ scene, status }: Opened, isReplay: boolean): Speed {
+  const times = initialSpeed(scene.cycle_s);
+  if (!isReplay || status.speed === "fastest") return { times };
+  return { times: Math.max(times, status.speed.times) };
 }

@@ -71,6 +71,7 @@ pub struct BarChart {
     y: Axis,
     series: Vec<BarSeries>,
     are_dots: bool,
+    interval_label: String,
 }
 
 impl BarChart {
@@ -87,6 +88,7 @@ impl BarChart {
             y: Axis::linear(""),
             series: vec![],
             are_dots: false,
+            interval_label: String::new(),
         }
     }
 
@@ -123,6 +125,13 @@ impl BarChart {
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
+        self
+    }
+
+    /// Sets what the legend says of the intervals; empty words have no place there.
+    #[must_use]
+    pub fn interval_label(mut self, label: impl Into<String>) -> Self {
+        self.interval_label = label.into();
         self
     }
 
@@ -186,6 +195,8 @@ impl BarChart {
             };
             entries.push(LegendEntry::new(symbol, &series.label));
         }
+        let intervals = LegendSymbol::Mean { color: INK.into() };
+        entries.push(LegendEntry::new(intervals, &self.interval_label));
         entries
     }
 

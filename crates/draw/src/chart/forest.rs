@@ -205,10 +205,10 @@ impl ForestChart {
         let is_broken = self.marks().any(|mark| width(&mark.text) > room);
         let mut lines = Vec::with_capacity(self.series.len());
         for series in &self.series {
-            let of_mark = |mark: &ForestMark| match mark.text.rsplit_once(", ") {
+            let of_mark = |mark: &ForestMark| match mark.text.rsplit_once(", p ") {
                 _ if !is_broken => vec![mark.text.clone()],
                 // All are broken at the same place, or lines of two effects run together.
-                Some((effect, p)) => [format!("{effect},"), p.to_string()]
+                Some((effect, p)) => [format!("{effect},"), format!("p {p}")]
                     .iter()
                     .flat_map(|part| text::wrap(&bound_words(part), size, Weight::Regular, room))
                     .collect(),
@@ -266,14 +266,16 @@ impl ForestChart {
                 let at = x.px(mark.value).clamp(frame.area.x, frame.area.right());
                 frame.push_spot((at, y), index, row);
             } else if !self.unmarked.is_empty() && !mark.text.is_empty() {
-                let faint = TextStyle { fill: FAINT_INK, halo: true, ..text_style };
-                let words = text::shorten(
-                    &self.unmarked,
-                    size,
-                    Weight::Regular,
-                    frame.area.right() - x.px(0.0) - size,
-                );
-                frame.svg.text(x.px(0.0) + 0.6 * size, y + faint.middle_px(), &words, &faint);
+                // Beside zero, on the side where more room is.
+                let zero = x.px(0.0);
+                let rooms_px = [zero - frame.area.x, frame.area.right() - zero];
+                let is_left = rooms_px[0] > rooms_px[1];
+                let anchor = if is_left { Anchor::End } else { Anchor::Start };
+                let faint = TextStyle { fill: FAINT_INK, halo: true, anchor, ..text_style };
+                let room_px = rooms_px[0].max(rooms_px[1]) - size;
+                let words = text::shorten(&self.unmarked, size, Weight::Regular, room_px);
+                let aside_px = if is_left { -0.6 * size } else { 0.6 * size };
+                frame.svg.text(zero + aside_px, y + faint.middle_px(), &words, &faint);
             }
         }
     }

@@ -112,13 +112,15 @@ pub struct LegendGroup {
     pub entries: Vec<(LegendLook, String)>,
 }
 
-/// What an entry of a group shows: a color, a pattern, or both.
+/// What an entry of a group shows of the looks of series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LegendLook {
     /// Number of a color; gray without one.
     pub color: Option<usize>,
-    /// Number of a marker and of dashes; a plain line or a filled box without one.
-    pub pattern: Option<usize>,
+    /// Number of a marker; none, or a filled box where there are no lines, without one.
+    pub marker: Option<usize>,
+    /// Number of dashes; 0 is a whole line.
+    pub dash: usize,
 }
 
 /// A straight line in data coordinates, such as the ideal speed-up.
@@ -335,13 +337,12 @@ impl Plot {
         let mut entries = vec![LegendEntry::new(LegendSymbol::None, &group.heading)];
         for (look, label) in &group.entries {
             let color = look.color.map_or_else(|| FAINT_INK.to_string(), series_color);
-            let pattern = look.pattern.map(Marker::of_series).filter(|_| has_markers);
-            let symbol = match (has_lines, pattern) {
+            let marker = look.marker.map(Marker::of_series).filter(|_| has_markers);
+            let symbol = match (has_lines, marker) {
                 (false, Some(marker)) => LegendSymbol::Marker { color: color.into(), marker },
                 (true, marker) => {
-                    let dash =
-                        SeriesLook { dash: look.pattern.unwrap_or(0), ..SeriesLook::of_series(0) };
-                    LegendSymbol::Line { color: color.into(), marker, dash: dash.dash_attribute() }
+                    let own = SeriesLook { dash: look.dash, ..SeriesLook::of_series(0) };
+                    LegendSymbol::Line { color: color.into(), marker, dash: own.dash_attribute() }
                 }
                 (false, None) => {
                     LegendSymbol::Swatch { fill: color.into(), rim: "none".into(), opacity: 1.0 }

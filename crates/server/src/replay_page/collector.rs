@@ -243,7 +243,8 @@ const MAX_PLAY_S: f64 = 60.0;
 /// Speeds that a page offers, from that of the run on.
 const SPEEDS: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
 
-/// Returns the lowest speed at which a run is over within a minute: nobody watches for longer.
+/// Returns the lowest speed at which a run is over within a minute, for nobody watches for longer; the fastest for runs
+/// that take even longer.
 fn first_speed(run_s: f64) -> Speed {
     let [.., fastest] = SPEEDS;
     Speed::Times(SPEEDS.into_iter().find(|speed| run_s <= speed * MAX_PLAY_S).unwrap_or(fastest))
