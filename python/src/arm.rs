@@ -500,3 +500,32 @@ fn other_postures<'py>(
     }
     Ok(others)
 }
+
+/// Makes an arm again: from its files, where they still hold the same texts, as they do on the same machine; else from
+/// these texts alone, without the meshes that the files name.
+///
+/// Raises InputError when a text is wrong.
+#[pyfunction]
+pub(crate) fn unpack_arm(source: ArmSource) -> PyResult<Arm> {
+    let is_there = |(path, text): &(PathBuf, String)| {
+        std::fs::read_to_string(path).is_ok_and(|found| found == *text)
+    };
+    if is_there(&source.urdf) && source.srdf.as_ref().is_none_or(is_there) {
+        return Arm::load(source);
+    }
+    let folder = tempfile::tempdir().map_err(|e| error::RecordError::new_err(e.to_string()))?;
+    let copy = |name: &str, text: &str| -> PyResult<PathBuf> {
+        let copy = folder.path().join(name);
+        let written = std::fs::write(&copy, text);
+        written.map_err(|e| error::RecordError::new_err(format!("{}: {e}", copy.display())))?;
+        Ok(copy)
+    };
+    let files = ArmFiles {
+        urdf: copy("arm.urdf", &source.urdf.1)?,
+        srdf: source.srdf.as_ref().map(|(_, text)| copy("arm.srdf", text)).transpose()?,
+        base: source.base.clone(),
+        tip: source.tip.clone(),
+        group: source.group.clone(),
+    };
+    Arm::load_files(&files, source)
+}

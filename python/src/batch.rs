@@ -4,7 +4,7 @@ use crate::arrays::{UnsignedArg, order_values};
 use crate::error::{self, argument_error};
 use crate::json::{to_list, to_python};
 use crate::pickle;
-use crate::scenario::{Bundle, LoadedScenario, Scenario, load};
+use crate::scenario::{Bundle, LoadedScenario, Scenario, load, unpack_scenario};
 use crate::space::{OutArrays, Team, zeroed_arrays};
 use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
@@ -405,4 +405,19 @@ impl Batch {
         let name = self.scenario.compiled.plan().name;
         format!("Batch({name}, {} worlds, {} workers)", self.worlds, self.workers)
     }
+}
+
+/// Makes many worlds again, each in its state.
+///
+/// Raises InputError when a state is damaged or of another build.
+#[pyfunction]
+pub(crate) fn unpack_batch(
+    py: Python<'_>,
+    scenario: Bundle,
+    seeds: Vec<u64>,
+    workers: usize,
+    states: Vec<Vec<u8>>,
+) -> PyResult<Batch> {
+    let scenario = unpack_scenario(py, scenario.0, scenario.1)?;
+    Batch::from_states(py, scenario.0, &seeds, workers, states)
 }

@@ -71,11 +71,11 @@ fn add_simulation(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(arrays::rows_by_name, module)?)?;
     module.add_function(wrap_pyfunction!(inspect::inspect, module)?)?;
     module.add_function(wrap_pyfunction!(inspect::write_clean, module)?)?;
-    module.add_function(wrap_pyfunction!(pickle::unpack_arm, module)?)?;
-    module.add_function(wrap_pyfunction!(pickle::unpack_batch, module)?)?;
-    module.add_function(wrap_pyfunction!(pickle::unpack_space, module)?)?;
-    module.add_function(wrap_pyfunction!(pickle::unpack_table, module)?)?;
-    module.add_function(wrap_pyfunction!(pickle::unpack_team, module)?)?;
+    module.add_function(wrap_pyfunction!(arm::unpack_arm, module)?)?;
+    module.add_function(wrap_pyfunction!(batch::unpack_batch, module)?)?;
+    module.add_function(wrap_pyfunction!(space::unpack_space, module)?)?;
+    module.add_function(wrap_pyfunction!(table::unpack_table, module)?)?;
+    module.add_function(wrap_pyfunction!(space::unpack_team, module)?)?;
     module.add_function(wrap_pyfunction!(read::read, module)?)?;
     module.add_function(wrap_pyfunction!(read::table_names, module)?)?;
     module.add_function(wrap_pyfunction!(scenario::schema, module)?)?;

@@ -362,3 +362,31 @@ fn format_shape(shape: &[usize]) -> String {
     let numbers: Vec<_> = shape.iter().map(ToString::to_string).collect();
     format!("({})", numbers.join(", "))
 }
+
+/// Makes a space again.
+#[pyfunction]
+pub(crate) fn unpack_space(
+    name: String,
+    shape: Vec<usize>,
+    bounds: SpaceBounds,
+    meaning: String,
+) -> Space {
+    Space(control::ValueSpace::new(name, bounds.into(), meaning).with_shape(shape))
+}
+
+/// Makes a team again.
+#[pyfunction]
+pub(crate) fn unpack_team(
+    name: String,
+    agents: Vec<u32>,
+    observed: Vec<PyRef<'_, Space>>,
+    ordered: Vec<PyRef<'_, Space>>,
+) -> Team {
+    let spaces = |list: Vec<PyRef<'_, Space>>| list.iter().map(|space| space.0.clone()).collect();
+    Team(Arc::new(control::AgentTeam {
+        name,
+        agents,
+        observation_spaces: spaces(observed),
+        action_spaces: spaces(ordered),
+    }))
+}

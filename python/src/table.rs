@@ -1,7 +1,7 @@
 //! Tables: rows as Arrow and NumPy arrays.
 
 use crate::arrays::UnsignedArg;
-use crate::error;
+use crate::error::{self, argument_error};
 use crate::json::to_list;
 use crate::notebook::to_html;
 use crate::pickle;
@@ -14,6 +14,7 @@ use arrow_array::{
     RecordBatchIterator, RecordBatchReader, StringArray, UInt32Array,
 };
 use arrow_buffer::{NullBuffer, ScalarBuffer};
+use arrow_ipc::reader::StreamReader;
 use arrow_schema::ffi::FFI_ArrowSchema;
 use arrow_schema::{ArrowError, DataType, Field, Schema};
 use numpy::{PyArray1, ToPyArray};
@@ -459,4 +460,26 @@ where
     }
     let real: Vec<f64> = array.iter().map(|cell| cell.map_or(f64::NAN, &as_real)).collect();
     real.to_pyarray(py).into_bound_py_any(py)
+}
+
+/// Makes a table again.
+///
+/// Raises InputError when the bytes are damaged.
+#[pyfunction]
+pub(crate) fn unpack_table(
+    name: String,
+    about: Vec<(String, String)>,
+    rows: &Bound<'_, PyBytes>,
+    expected: u32,
+) -> PyResult<Table> {
+    let damaged = |cause: String| {
+        argument_error("rows", cause, "give the bytes that a pickle of a table holds, unchanged")
+    };
+    if pickle::checksum(rows)? != expected {
+        return Err(damaged("they do not have their checksum".into()));
+    }
+    let mut reader =
+        StreamReader::try_new(rows.as_bytes(), None).map_err(|e| damaged(e.to_string()))?;
+    let batch = reader.next().ok_or_else(|| damaged("they hold no rows".into()))?;
+    Table::from_arrow(name, about, batch.map_err(|e| damaged(e.to_string()))?).map_err(damaged)
 }
