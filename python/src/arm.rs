@@ -3,7 +3,7 @@
 use crate::choice::choose;
 use crate::error::{self, argument_error};
 use crate::json::to_list;
-use crate::pickle::{self, ArmSource};
+use crate::pickle::{self, ArmSource, Pickle};
 use crate::result::{Fields, ResultClass};
 use crate::watch::run_polling;
 use crate::worlds;
@@ -277,7 +277,7 @@ impl Arm {
     }
 
     /// Pickles the arm with the texts of its files; meshes that these name are taken from their places.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (ArmSource,))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickle<'py, (ArmSource,)>> {
         Ok((pickle::maker(py, "unpack_arm")?, (self.source.clone(),)))
     }
 

@@ -3,7 +3,7 @@
 use crate::arrays::{UnsignedArg, order_values};
 use crate::error::{self, argument_error};
 use crate::json::{to_list, to_python};
-use crate::pickle;
+use crate::pickle::{self, Pickle};
 use crate::scenario::{Bundle, LoadedScenario, Scenario, load, unpack_scenario};
 use crate::space::{OutArrays, Team, zeroed_arrays};
 use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods, ToPyArray};
@@ -385,10 +385,7 @@ impl Batch {
     }
 
     /// Pickles the worlds in their states; orders that wait for the next step are not in it.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bundle, Vec<u64>, usize, Vec<Bound<'py, PyBytes>>))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickle<'py, PickledBatch<'py>>> {
         let ResolvedScenario { text, files } = self.scenario.resolved()?.clone();
         let (seeds, states) = self.with_worlds(py, |batch| {
             Ok((batch.seeds(), batch.map_worlds(|run| run.checkpoint())?))
@@ -406,6 +403,9 @@ impl Batch {
         format!("Batch({name}, {} worlds, {} workers)", self.worlds, self.workers)
     }
 }
+
+/// The arguments of [`unpack_batch`].
+type PickledBatch<'py> = (Bundle, Vec<u64>, usize, Vec<Bound<'py, PyBytes>>);
 
 /// Makes many worlds again, each in its state.
 ///

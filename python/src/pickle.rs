@@ -8,6 +8,9 @@ use pyo3::types::PyBytes;
 use sidestep::kernel::control::ValueDomain;
 use std::path::PathBuf;
 
+/// A pickle: the function that makes a class again, and its arguments.
+pub(crate) type Pickle<'py, T> = (Bound<'py, PyAny>, T);
+
 /// Returns a function of the native module, by which a class is made again.
 pub(crate) fn maker<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("sidestep._native")?.getattr(name)

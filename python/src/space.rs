@@ -2,7 +2,7 @@
 
 use crate::error::{self, argument_error};
 use crate::json::to_list;
-use crate::pickle::{self, SpaceBounds};
+use crate::pickle::{self, Pickle, SpaceBounds};
 use numpy::{
     PyArray1, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArrayMethods, ToPyArray,
 };
@@ -86,10 +86,7 @@ impl Space {
         &self.0.meaning
     }
 
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<usize>, SpaceBounds, String))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickle<'py, PickledSpace>> {
         let control::ValueSpace { name, shape, kind, meaning } = &self.0;
         let values = (name.clone(), shape.clone(), kind.into(), meaning.clone());
         Ok((pickle::maker(py, "unpack_space")?, values))
@@ -148,11 +145,7 @@ impl Team {
         self.action_spaces(py)
     }
 
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<u32>, Bound<'py, PyList>, Bound<'py, PyList>))>
-    {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickle<'py, PickledTeam<'py>>> {
         let values = (
             self.0.name.clone(),
             self.0.agents.clone(),
@@ -362,6 +355,12 @@ fn format_shape(shape: &[usize]) -> String {
     let numbers: Vec<_> = shape.iter().map(ToString::to_string).collect();
     format!("({})", numbers.join(", "))
 }
+
+/// The arguments of [`unpack_space`].
+type PickledSpace = (String, Vec<usize>, SpaceBounds, String);
+
+/// The arguments of [`unpack_team`].
+type PickledTeam<'py> = (String, Vec<u32>, Bound<'py, PyList>, Bound<'py, PyList>);
 
 /// Makes a space again.
 #[pyfunction]

@@ -4,7 +4,7 @@ use crate::arrays::UnsignedArg;
 use crate::error::{self, argument_error};
 use crate::json::to_list;
 use crate::notebook::to_html;
-use crate::pickle;
+use crate::pickle::{self, Pickle};
 use crate::worlds;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
@@ -93,7 +93,7 @@ impl Table {
             let cause = format!("the step of a slice of rows is {}", rows.step);
             return Err(PyValueError::new_err(format!("{cause}\n  help: leave the step out")));
         }
-        let batch = self.batch.slice(rows.start.max(0) as usize, rows.slicelength as usize);
+        let batch = self.batch.slice(rows.start.max(0) as usize, rows.slicelength);
         Ok(Self { schema: self.schema.clone(), batch })
     }
 
@@ -229,7 +229,7 @@ impl Table {
     }
 
     /// Pickles all rows: a task of a process pool returns what it recorded.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledTable<'py>)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickle<'py, PickledTable<'py>>> {
         let rows = pickle::arrow_bytes(&self.batch).map_err(|e| arrow_error(&e))?;
         let rows = PyBytes::new(py, &rows);
         let checksum = pickle::checksum(&rows)?;
@@ -299,7 +299,7 @@ impl Table {
     }
 }
 
-/// The arguments of [`pickle::unpack_table`].
+/// The arguments of [`unpack_table`].
 type PickledTable<'py> = (String, Vec<(String, String)>, Bound<'py, PyBytes>, u32);
 
 /// Returns one sentence about a column of a table of runs.
