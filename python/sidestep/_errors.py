@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+
 
 class SidestepError(Exception):
     """Base class of all exceptions of Sidestep."""
@@ -69,7 +71,11 @@ def input_error(place: str, cause: str, remedy: str) -> InputError:
 
 
 def checked_int(name: str, value: int, low: int, high: int) -> int:
-    """Returns an integer, if it is in its range."""
-    if not low <= value <= high:
-        raise input_error(name, f"is {value}", f"give a number from {low} to {high}")
-    return value
+    """Returns an integer, if it is one and in its range."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise input_error(name, f"is {value!r}", f"give a whole number from {low} to {high}") from None
+    if not low <= number <= high:
+        raise input_error(name, f"is {number}", f"give a number from {low} to {high}")
+    return number

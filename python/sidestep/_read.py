@@ -65,6 +65,9 @@ def read(folder: str | os.PathLike[str], tables: Sequence[str] | None = None) ->
     (['events', 'series', 'trajectories'], 60)
     """
     known = table_names(folder)
+    if not known and not any(os.path.isfile(os.path.join(folder, name)) for name in ("run.json", "sweep.json")):
+        cause, remedy = "there is no run and no sweep", "give the folder that one was recorded to"
+        raise input_error(os.fspath(folder), cause, remedy)
     unknown = [name for name in tables or () if name not in known]
     if unknown:
         raise input_error(os.fspath(folder), f"there is no table `{unknown[0]}`", f"give some of {', '.join(known)}")

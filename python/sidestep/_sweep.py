@@ -61,7 +61,10 @@ class Sweep:
         (3,)
         """
         values = self.results[metric]
-        return values if variant is None else values[self.results["variant"] == variant]
+        if variant is None:
+            return values
+        variant = checked_int("variant", variant, 0, len(self.summary["variants"]) - 1)
+        return values[self.results["variant"] == variant]
 
     def __len__(self) -> int:
         return len(self.results)

@@ -87,6 +87,9 @@ def minimize(
     >>> collectives.minimize(objective=lambda joint: abs(joint.sum() - 4), strategies=[3, 3, 3], seed=1).cost
     0.0
     """
+    if callable(own) or callable(pairs):
+        remedy = "give objective=, and the number of each player's strategies as strategies="
+        raise input_error("own" if callable(own) else "pairs", "it is a function, and costs are tables", remedy)
     is_exact = objective is None
     options: dict[str, Any] = {
         "estimator": estimator or ("exact" if is_exact else "sampled"),

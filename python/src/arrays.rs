@@ -4,26 +4,41 @@ use crate::error;
 use crate::json::to_list;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyOverflowError;
+use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString, PyTuple};
 use sidestep::kernel::EntityId;
 use sidestep::kernel::view::Body;
 
-/// An argument that is a whole number, which may be larger in Python than in Rust.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct UnsignedArg(pub(crate) u64);
+/// An argument that is a whole number from 0 on, which may be larger in Python than in Rust.
+#[derive(Debug, Clone)]
+pub(crate) struct UnsignedArg(Result<u64, String>);
+
+impl UnsignedArg {
+    pub(crate) const fn new(number: u64) -> Self {
+        Self(Ok(number))
+    }
+
+    /// Returns the number; the error of one that is out of range has the name of the argument, which the conversion
+    /// itself does not know.
+    pub(crate) fn named(self, name: &str) -> PyResult<u64> {
+        self.0.map_err(|number| {
+            let remedy = format!("give a whole number from 0 to {}", u64::MAX);
+            error::argument_error(name, format!("{number} is out of range"), remedy)
+        })
+    }
+}
 
 impl FromPyObject<'_, '_> for UnsignedArg {
     type Error = PyErr;
 
     fn extract(value: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
-        value.extract::<u64>().map(UnsignedArg).map_err(|raised| {
-            if !raised.is_instance_of::<PyOverflowError>(value.py()) {
-                return raised;
+        match value.extract::<u64>() {
+            Err(raised) if raised.is_instance_of::<PyOverflowError>(value.py()) => {
+                Ok(Self(Err(value.to_string())))
             }
-            let remedy = format!("give a whole number from 0 to {}", u64::MAX);
-            error::argument_error("argument", format!("{} is out of range", &*value), remedy)
-        })
+            number => number.map(Self::new),
+        }
     }
 }
 
@@ -55,6 +70,7 @@ pub(crate) fn order_values(
     agents: usize,
     shape: Option<&[usize]>,
 ) -> PyResult<Vec<f64>> {
+    refuse_loss(py, order, values)?;
     let float = py.import("numpy")?.getattr("float64")?;
     let array = py.import("numpy")?.call_method1("asarray", (values, float));
     let array = array.map_err(|e| {
@@ -81,6 +97,24 @@ pub(crate) fn order_values(
     Ok(array
         .as_slice()
         .map_or_else(|_| array.as_array().iter().copied().collect(), <[f64]>::to_vec))
+}
+
+/// Refuses arrays of which NumPy would drop something: the mask, or imaginary parts.
+fn refuse_loss(py: Python<'_>, order: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
+    let Ok(dtype) = values.getattr(intern!(py, "dtype")) else { return Ok(()) };
+    let kind: String =
+        dtype.getattr(intern!(py, "kind")).and_then(|kind| kind.extract()).unwrap_or_default();
+    if kind == "c" {
+        return Err(refused_order(order, "must be real numbers, not complex ones"));
+    }
+    let mask = values.getattr(intern!(py, "mask"));
+    if mask.is_ok_and(|mask| {
+        mask.call_method0("any").is_ok_and(|any| any.is_truthy().unwrap_or(false))
+    }) {
+        let cause = "has masked values; give a number for each agent, or order some by `agents`";
+        return Err(refused_order(order, cause));
+    }
+    Ok(())
 }
 
 fn refused_order(order: &str, cause: &str) -> PyErr {

@@ -22,7 +22,7 @@ const SIGNAL_POLL_INTERVAL: Duration = Duration::from_millis(10);
 /// mistaken number would take all memory before anything could be reported.
 const MAX_WORLDS: usize = 1 << 20;
 /// Largest number of workers, as for a sweep.
-const MAX_WORKERS: usize = 1024;
+pub(crate) const MAX_WORKERS: usize = 1024;
 
 /// Many worlds of one scenario that step together, each with its own seed.
 ///
@@ -129,8 +129,8 @@ impl Batch {
 }
 
 /// Returns a number of things, which must be from 1 to `max`.
-fn bounded_count(name: &str, UnsignedArg(count): UnsignedArg, max: usize) -> PyResult<usize> {
-    let count = usize::try_from(count).unwrap_or(usize::MAX);
+pub(crate) fn bounded_count(name: &str, count: UnsignedArg, max: usize) -> PyResult<usize> {
+    let count = usize::try_from(count.named(name)?).unwrap_or(usize::MAX);
     if (1..=max).contains(&count) {
         return Ok(count);
     }
@@ -185,7 +185,7 @@ fn start_function(scenario: &Arc<LoadedScenario>) -> PyResult<Arc<SimulationFact
 impl Batch {
     #[new]
     #[pyo3(
-        signature = (scenario, worlds, *, workers=UnsignedArg(1), seeds=None),
+        signature = (scenario, worlds, *, workers=UnsignedArg::new(1), seeds=None),
         text_signature = "(scenario, worlds, *, workers=1, seeds=None)"
     )]
     fn new(
@@ -302,7 +302,7 @@ impl Batch {
     /// >>> batch.step(mask=np.array([True, False, True]))
     /// >>> batch.cycles.tolist()
     /// [6, 5, 6]
-    #[pyo3(signature = (cycles=UnsignedArg(1), *, mask=None), text_signature = "($self, cycles=1, *, mask=None)")]
+    #[pyo3(signature = (cycles=UnsignedArg::new(1), *, mask=None), text_signature = "($self, cycles=1, *, mask=None)")]
     fn step(
         &self,
         py: Python<'_>,
@@ -310,7 +310,7 @@ impl Batch {
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let mask = self.parse_mask(mask)?;
-        let mut remaining = cycles.0;
+        let mut remaining = cycles.named("cycles")?;
         let mut chunk = 1;
         loop {
             let now = remaining.min(chunk);

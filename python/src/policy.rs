@@ -46,11 +46,16 @@ pub(crate) fn run_with_policies(
     let state = state.unwrap_or_else(|| PyDict::new(py).into_any());
     let from = run.now(py)?;
     while run.now(py)? < until && !run.has_ended(py)? {
+        let cycle = run.now(py)?;
         for policy in &policies {
             policy.order(py, run, &state).inspect_err(|raised| {
                 // Without the note, the exception itself still reaches the user.
                 let _ = add_cycle_note(py, run, raised);
             })?;
+        }
+        if run.now(py)? != cycle {
+            let cause = "`decide` has advanced the run itself: its orders are for the cycle that it was asked about";
+            return Err(OrderError::new_err(cause));
         }
         run.advance(py)?;
     }

@@ -1,6 +1,7 @@
 //! Simulations that Python advances, observes and orders.
 
 use crate::arrays::{UnsignedArg, agent_ids, body_column, body_rows, body_texts, order_values};
+use crate::batch::{MAX_WORKERS, bounded_count};
 use crate::blocks::Blocks;
 use crate::error::{self, ClosedError, argument_error};
 use crate::json::to_python;
@@ -71,9 +72,6 @@ impl Simulation {
         workers: usize,
         paths: OutputPaths<'_>,
     ) -> PyResult<Self> {
-        if workers == 0 {
-            return Err(argument_error("workers", "0 workers cannot simulate", "give 1 or more"));
-        }
         let run = py.detach(|| {
             // Without a folder, the run is identified by the text that its folder would have: so checkpoints of either can be
             // restored in the other.
@@ -272,6 +270,19 @@ fn condition_name(body: &Body) -> String {
     format!("{:?}", body.state).to_lowercase()
 }
 
+/// Refuses an order in which an agent has two values, of which only the last would count.
+fn refuse_repeated(agents: &[EntityId]) -> PyResult<()> {
+    let mut sorted = agents.to_vec();
+    sorted.sort_unstable();
+    match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => {
+            let cause = format!("`agents` has {} twice; give each agent one value", pair[0]);
+            Err(error::OrderError::new_err(cause))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Returns the look of a picture from the arguments of `render`.
 fn parse_look(
     width: u32,
@@ -354,7 +365,7 @@ fn closed_error() -> PyErr {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scenario, *, seed=None, workers=UnsignedArg(1), record=RecordArgument(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
+    #[pyo3(signature = (scenario, *, seed=None, workers=UnsignedArg::new(1), record=RecordArgument(None), out=None, replace=false), text_signature = "(scenario, *, seed=None, workers=1, record=False, out=None, replace=False)")]
     fn new(
         scenario: &Bound<'_, PyAny>,
         seed: Option<UnsignedArg>,
@@ -364,13 +375,14 @@ impl Simulation {
         replace: bool,
     ) -> PyResult<Self> {
         let py = scenario.py();
+        let workers = bounded_count("workers", workers, MAX_WORKERS)?;
         let mut scenario = load(scenario)?;
-        let seed = seed.map(|UnsignedArg(seed)| seed);
+        let seed = seed.map(|seed| seed.named("seed")).transpose()?;
         if let Some(seed) = seed.filter(|&seed| seed != scenario.compiled.plan().seed) {
             scenario = Arc::new(scenario.reseeded(py, seed)?);
         }
         let paths = OutputPaths { folder: out.as_deref(), replace, ..OutputPaths::default() };
-        let simulation = Self::start(py, scenario, workers.0 as usize, paths)?;
+        let simulation = Self::start(py, scenario, workers, paths)?;
         if let RecordArgument(Some(selection)) = record {
             let mut run = simulation.run.lock().unwrap_or_else(PoisonError::into_inner);
             let run = run.as_mut().ok_or_else(closed_error)?;
@@ -384,9 +396,9 @@ impl Simulation {
     ///
     /// >>> sim.step(), sim.step(5)
     /// (1, 5)
-    #[pyo3(signature = (cycles=UnsignedArg(1)), text_signature = "($self, cycles=1)")]
+    #[pyo3(signature = (cycles=UnsignedArg::new(1)), text_signature = "($self, cycles=1)")]
     fn step(&self, py: Python<'_>, cycles: UnsignedArg) -> PyResult<u64> {
-        self.advance_to_goal(py, Goal::Further(cycles.0))
+        self.advance_to_goal(py, Goal::Further(cycles.named("cycles")?))
     }
 
     /// Advances to cycle `until`, by default the planned end, and returns the number of cycles done.
@@ -407,7 +419,7 @@ impl Simulation {
         state: Option<Bound<'_, PyAny>>,
     ) -> PyResult<u64> {
         let simulation = slf.get();
-        let until = simulation.end_cycle(until.map(|UnsignedArg(until)| until));
+        let until = simulation.end_cycle(until.map(|until| until.named("until")).transpose()?);
         match decide {
             None => simulation.advance_to_goal(slf.py(), Goal::Until(until)),
             Some(decide) => run_with_policies(slf.py(), simulation, decide, state, until),
@@ -501,6 +513,9 @@ impl Simulation {
         team: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let agents = agents.map(|agents| agent_ids(agents.py(), agents)).transpose()?;
+        if let Some(agents) = &agents {
+            refuse_repeated(agents)?;
+        }
         let (_, team) = match (team, &agents) {
             (None, Some(agents)) => self.team_of(agents.first().copied())?,
             (team, _) => self.find_team(team)?,
@@ -694,7 +709,7 @@ impl Simulation {
                 "leave it out",
             ));
         };
-        let frames = frames.map(|UnsignedArg(frames)| frames);
+        let frames = frames.map(|frames| frames.named("frames")).transpose()?;
         let selection = RowSelection { frames, ..selection };
         self.with_run(py, |run| run.keep_rows(&selection).map_err(|e| error::input_error(&e)))
     }
@@ -733,7 +748,7 @@ impl Simulation {
     /// 80 80
     /// 100 40
     #[pyo3(
-        signature = (cycles=UnsignedArg(1024), until=None, *, decide=None, state=None),
+        signature = (cycles=UnsignedArg::new(1024), until=None, *, decide=None, state=None),
         text_signature = "($self, cycles=1024, until=None, *, decide=None, state=None)"
     )]
     fn blocks(
@@ -745,7 +760,8 @@ impl Simulation {
     ) -> PyResult<Blocks> {
         let py = slf.py();
         let simulation = slf.get();
-        if cycles.0 == 0 {
+        let cycles = cycles.named("cycles")?;
+        if cycles == 0 {
             return Err(argument_error(
                 "cycles",
                 "a block of 0 cycles never ends",
@@ -758,11 +774,11 @@ impl Simulation {
             }
             run.keep_rows(&RowSelection::default()).map_err(|e| error::input_error(&e))
         })?;
-        let until = simulation.end_cycle(until.map(|UnsignedArg(until)| until));
+        let until = simulation.end_cycle(until.map(|until| until.named("until")).transpose()?);
         // Functions keep their state from block to block, as from cycle to cycle.
         let state = state.unwrap_or_else(|| PyDict::new(py).into_any().unbind());
         let simulation = slf.into_any().unbind();
-        Ok(Blocks { simulation, cycles: cycles.0, until, decide, state })
+        Ok(Blocks { simulation, cycles, until, decide, state })
     }
 
     /// Ends the run. A run folder gets its summary and picture: it is complete at the planned end, and otherwise can

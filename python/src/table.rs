@@ -260,9 +260,10 @@ impl Table {
     ///
     /// >>> [row[:2] for row in table.head(2)]
     /// [(0, 0), (1, 0)]
-    #[pyo3(signature = (rows=UnsignedArg(5)), text_signature = "($self, rows=5)")]
+    #[pyo3(signature = (rows=UnsignedArg::new(5)), text_signature = "($self, rows=5)")]
     fn head<'py>(&self, py: Python<'py>, rows: UnsignedArg) -> PyResult<Vec<Bound<'py, PyTuple>>> {
-        let rows = self.batch.num_rows().min(usize::try_from(rows.0).unwrap_or(usize::MAX));
+        let rows =
+            self.batch.num_rows().min(usize::try_from(rows.named("rows")?).unwrap_or(usize::MAX));
         let first = self.batch.slice(0, rows);
         let mut columns = Vec::new();
         for (array, spec) in first.columns().iter().zip(&self.schema.columns) {

@@ -177,3 +177,55 @@ def test_a_forgotten_return_is_told(external):
     with pytest.raises(sidestep.OrderError, match="`robot` returned None; return its orders, {} for none"):
         sim.run(decide=lambda observed, state: None)
     assert sim.run(1, decide=lambda observed, state: {}) == 1
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda sim: sim.order("action", np.ma.array([0, 1], mask=[0, 1])), "masked"),
+        (lambda sim: sim.order("action", np.array([1j, 0])), "complex"),
+        (lambda sim: sim.order("action", [0, 1], agents=[0, 0]), "0 twice"),
+        (lambda sim: sim.step(-1), "cycles: -1 is out of range"),
+        (lambda sim: sim.run(until=-3), "until: -3 is out of range"),
+        (lambda sim: sidestep.Simulation(sim.scenario, workers=10**6), "workers: is 1000000"),
+        (lambda sim: sidestep.Simulation(sim.scenario, workers=-1), "workers: -1 is out of range"),
+        (lambda sim: sidestep.Simulation(sim.scenario, seed=-1), "seed: -1 is out of range"),
+        (lambda sim: sidestep.sweep(sim.scenario, replicate=2).values("contacts", 9), "variant: is 9"),
+        (lambda sim: sidestep.sweep(sim.scenario, replicate=1.5), "replicate: is 1.5"),
+        (lambda sim: sidestep.collectives.minimize([2, 2], lambda joint: 0.0), "pairs: it is a function"),
+    ],
+)
+def test_a_mistake_is_told_with_the_argument_and_its_value(external, call, words):
+    sim = sidestep.Simulation(changed(external, cycles=5))
+    assert len(sim.teams[0]) == 2
+    with pytest.raises((sidestep.InputError, sidestep.OrderError), match=words):
+        call(sim)
+
+
+def test_a_masked_array_without_masked_values_is_an_array(external):
+    sim = sidestep.Simulation(external)
+    sim.order("action", np.ma.array([0, 1], mask=[0, 0]))
+
+
+def test_a_folder_without_a_run_has_no_tables_and_says_so(tmp_path):
+    with pytest.raises(sidestep.InputError, match="no run and no sweep"):
+        sidestep.read(tmp_path)
+
+
+def test_a_function_that_advances_the_run_itself_is_refused(external):
+    sim = sidestep.Simulation(external)
+
+    def decide(_, __):
+        sim.step()
+        return [0, 0]
+
+    with pytest.raises(sidestep.OrderError, match="advanced the run itself"):
+        sim.run(5, decide=decide)
+
+
+def test_an_episode_has_whole_cycles(external):
+    envs = pytest.importorskip("sidestep.envs")
+    with pytest.raises(sidestep.InputError, match="max_cycles: is 1.5"):
+        envs.parallel_env(external, max_cycles=1.5)
+    with pytest.raises(sidestep.InputError, match="max_cycles: is 0"):
+        envs.Batch(external, 2, max_cycles=0)

@@ -12,10 +12,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv as GymnasiumVectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from .._errors import input_error
+from .._errors import checked_int, input_error
 from .._native import Batch as Worlds
 from .._native import Scenario, world_facts
 from ._parallel import (
+    MAX_CYCLES,
     MAX_SEED,
     action_space,
     orders_of,
@@ -63,8 +64,8 @@ class Batch:
         workers: int = 1,
     ) -> None:
         self.scenario = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
-        if max_cycles is not None and max_cycles < 1:
-            raise input_error("max_cycles", f"{max_cycles} cycles are not an episode", "give 1 or more")
+        if max_cycles is not None:
+            max_cycles = checked_int("max_cycles", max_cycles, 1, MAX_CYCLES)
         modes = [mode.value for mode in AutoresetMode]
         if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in modes:
             remedy = f"one of {', '.join(modes)}"

@@ -11,11 +11,13 @@ import pettingzoo
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from .._errors import input_error
+from .._errors import checked_int, input_error
 from .._native import Scenario, Simulation, Space, Team, rows_by_name, world_facts, worlds
 from ._rewards import DEFAULTS, Reward, combine_rewards, compute_rewards
 
 MAX_INT64 = np.iinfo(np.int64).max
+# Cycles of an episode are at most this.
+MAX_CYCLES = 2**63 - 1
 # Seeds of episodes are below this.
 MAX_SEED = 2**62
 
@@ -96,8 +98,8 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
             "width": width,
             "workers": workers,
         }
-        if max_cycles is not None and max_cycles < 1:
-            raise input_error("max_cycles", f"{max_cycles} cycles are not an episode", "give 1 or more")
+        if max_cycles is not None:
+            max_cycles = checked_int("max_cycles", max_cycles, 1, MAX_CYCLES)
         self.max_cycles = self.scenario.cycles if max_cycles is None else max_cycles
         self.sim = Simulation(self.scenario, workers=workers)
         self._teams = [(k, t) for k, t in enumerate(self.sim.teams) if t.action_spaces]
