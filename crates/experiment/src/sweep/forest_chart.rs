@@ -65,7 +65,7 @@ fn metrics_forest(
         kind: FigureKind::Forest {
             rows: metrics.iter().map(|metric| capitalized(&metric.label)).collect(),
             texts,
-            words: ForestWords { heading: heading(metrics), unmarked: unit.unmarked(baseline) },
+            words: ForestWords { heading: heading(metrics), unmarked: unit.unmarked().into() },
         },
         series,
         ..Figure::default()
@@ -196,11 +196,11 @@ impl EffectUnit {
         }
     }
 
-    /// Returns why an effect has no mark.
-    fn unmarked(self, baseline: &str) -> String {
+    /// Returns why an effect has no mark, in few letters: there is little room.
+    fn unmarked(self) -> &'static str {
         match self {
-            Self::Percent => format!("{baseline}: near 0"),
-            Self::StandardDeviations => format!("{baseline}: all equal"),
+            Self::Percent => "mean \u{2248} 0",
+            Self::StandardDeviations => "equal runs",
         }
     }
 
