@@ -157,6 +157,8 @@ fn plot(figure: &Figure, mark: Mark) -> Plot {
     plot.legend_groups(legend)
 }
 
+/// Relative difference of two values that may come from rounding alone.
+const MAX_ROUNDING: f64 = 1e-9;
 /// Part of an axis of values that stays free beyond the last one.
 const AXIS_MARGIN: f64 = 0.04;
 
@@ -174,7 +176,10 @@ fn band_axes(figure: &Figure, x_axis: Axis, y_axis: Axis) -> (Axis, Axis) {
     let margin = AXIS_MARGIN * (high - low);
     // Zero belongs to an axis that comes near it.
     low = if lowest_mean >= 0.0 && low < 0.4 * high { 0.0 } else { low - margin };
-    let is_range = |from: f64, to: f64| from.is_finite() && to.is_finite() && from < to;
+    // What differs by rounding alone is one value, around which an axis makes room by itself.
+    let is_range = |from: f64, to: f64| {
+        from.is_finite() && to.is_finite() && to - from > MAX_ROUNDING * from.abs().max(to.abs())
+    };
     let is_linear = |scale: Scale| scale == Scale::Linear;
     let has_x = is_linear(figure.x_scale) && is_range(x[0], x[1]);
     let has_y = is_linear(figure.y_scale) && is_range(low, high);

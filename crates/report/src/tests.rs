@@ -227,3 +227,23 @@ fn titles_become_parts_of_file_names() {
     assert_eq!(slug("Trip times, by regime"), "trip-times-by-regime");
     assert_eq!(slug("1/2 (s)"), "1-2-s");
 }
+
+#[test]
+fn bands_of_one_value_of_nothing_and_of_negative_values_are_drawn() {
+    let rounded = 0.1 + 0.2;
+    let runs = [
+        vec![],
+        vec![(0.0, 0.3), (1.0, rounded)],
+        vec![(5.0, 1.0)],
+        vec![(0.0, -3.0), (9.0, -1.0)],
+    ];
+    for values in runs {
+        let points =
+            values.iter().map(|&(x, y)| Point::new(x, y).with_interval(Some((y - 1e-17, y))));
+        let series = vec![Series { name: "a".into(), points: points.collect() }];
+        let figure = Figure { kind: FigureKind::Bands, series, ..Figure::default() };
+        let mut document = Document::new("T", "");
+        document.figures([figure]);
+        assert!(render(&document, "figures").is_ok(), "{values:?}");
+    }
+}
