@@ -58,6 +58,7 @@ pub(crate) fn checksum(rows: &Bound<'_, PyBytes>) -> PyResult<u32> {
 
 /// The files of an arm: paths, and their texts as they were read.
 #[derive(Clone, FromPyObject, IntoPyObject)]
+#[pyo3(from_item_all)]
 pub(crate) struct ArmSource {
     pub(crate) urdf: (PathBuf, String),
     pub(crate) srdf: Option<(PathBuf, String)>,

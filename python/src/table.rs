@@ -178,40 +178,19 @@ impl Table {
         )))
     }
 
-    /// The names of the columns: `dict(table)` has all of them.
+    /// Names of the columns: `dict(table)` has all of them as arrays.
+    ///
+    /// >>> sorted(dict(table)) == sorted(table.columns)
+    /// True
     fn keys(&self) -> Vec<&str> {
         self.columns()
     }
 
-    /// Iterates over the names of the columns, as data frames do.
-    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        PyList::new(py, self.columns())?.into_any().call_method0("__iter__")
-    }
-
-    /// The rows as a structured array of NumPy, with a field for each column.
-    #[pyo3(signature = (dtype=None, copy=None))]
-    fn __array__<'py>(
-        &self,
-        py: Python<'py>,
-        dtype: Option<Bound<'py, PyAny>>,
-        copy: Option<bool>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        if copy == Some(false) {
-            let cause = "rows of a table are columns in memory, so that an array of rows is a copy";
-            return Err(PyValueError::new_err(format!("{cause}\n  help: leave copy=False out")));
-        }
-        let mut arrays = Vec::with_capacity(self.schema.columns.len());
-        for (array, spec) in self.batch.columns().iter().zip(&self.schema.columns) {
-            arrays.push(to_numpy_column(py, array, spec.ty)?);
-        }
-        let names = PyDict::new(py);
-        names.set_item("names", self.columns())?;
-        let records = py.import("numpy")?.getattr("rec")?;
-        let rows = records.call_method("fromarrays", (arrays,), Some(&names))?;
-        match dtype {
-            Some(dtype) => rows.call_method1("astype", (dtype,)),
-            None => Ok(rows),
-        }
+    /// Refuses to iterate: over rows or over columns, programs would disagree.
+    fn __iter__(&self) -> PyResult<Bound<'_, PyAny>> {
+        let remedy = "`columns` has the names, `dict(table)` the columns, `head` rows; a data frame is \
+                      pandas.DataFrame.from_arrow(table) or polars.DataFrame(table)";
+        Err(PyTypeError::new_err(format!("a table is not iterated\n  help: {remedy}")))
     }
 
     /// Returns the same rows with only these columns, in this order; nothing is copied.

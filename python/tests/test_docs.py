@@ -93,7 +93,7 @@ def test_everything_is_documented_and_its_examples_run(root, monkeypatch):
 def test_every_function_and_method_has_an_example():
     """Attributes need none, and neither do functions that the package's own modules stand on."""
     own = {
-        "rebuild", "unpack_scenario", "rows_by_name", "table_names", "run_sweep", "run_task", "compare_methods",
+        "rebuild", "unpack_arm", "unpack_batch", "unpack_scenario", "unpack_space", "unpack_table", "unpack_team", "rows_by_name", "table_names", "run_sweep", "run_task", "compare_methods",
         "learn_effector", "learn_sensor", "minimize_objective", "minimize_pairs", "Arm.forward", "Arm.inverse",
         "arm_trajectories",
     }  # fmt: skip

@@ -168,7 +168,7 @@ def test_rewards_are_sums_of_terms_or_a_function_and_unknown_ones_are_errors(mak
         both.step({**dict.fromkeys(both.agents, 0), "robot_77": 0})
     with pytest.raises(sidestep.InputError, match="call reset first"):
         make().step({})
-    with pytest.raises(sidestep.InputError, match="give 1 or more"):
+    with pytest.raises(sidestep.InputError, match="max_cycles: is 0"):
         make(max_cycles=0)
     assert make(orders="action").action_space("robot_0").n == 4
     with pytest.raises(sidestep.InputError, match="some of action, trip, broadcast"):

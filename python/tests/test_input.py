@@ -123,7 +123,7 @@ def test_a_folder_in_use_is_not_overwritten(external, tmp_path):
 def test_rows_that_nobody_keeps_cannot_be_taken(external):
     with pytest.raises(sidestep.InputError, match="record=True"):
         sidestep.Simulation(external).tables()
-    with pytest.raises(sidestep.InputError, match="0 workers"):
+    with pytest.raises(sidestep.InputError, match="workers: is 0"):
         sidestep.Simulation(external, workers=0)
 
 

@@ -156,7 +156,7 @@ def test_unknown_options_and_wrong_values_are_errors(external):
     several = {**external, "robots": [external["robots"][0], {**external["robots"][0], "sensors": []}]}
     for call, words in [
         (lambda: Batch(external, 2, rewards={"speed": 1.0}), "one of contact, moved, turned"),
-        (lambda: Batch(external, 2, max_cycles=0), "give 1 or more"),
+        (lambda: Batch(external, 2, max_cycles=0), "max_cycles: is 0"),
         (lambda: Batch(external, 2, orders=["jump"]), "some of action, trip, broadcast"),
         (lambda: Batch(external, 2, autoreset_mode="Never"), "one of NextStep, SameStep, Disabled"),
         (lambda: Batch(nobody, 2), "no agent of this scenario takes orders"),

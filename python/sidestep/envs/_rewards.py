@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,48 +20,44 @@ Reward = Callable[[Arrays, Arrays], NDArray[Any]]
 """A term: from a team's observations before and after a step to a number for each agent."""
 
 
-def _value(observation: str) -> Reward:
-    return lambda before, after: after[observation]
+# Measures are plain functions, whose observations are bound by `partial`: environments are pickled with their rewards.
 
 
-def _positive(observation: str) -> Reward:
-    return lambda before, after: np.asarray(after[observation] > 0)
+def _value(before: Arrays, after: Arrays, *, observation: str) -> NDArray[Any]:
+    return after[observation]
 
 
-def _changed(observation: str) -> Reward:
-    return lambda before, after: np.asarray(after[observation] != before[observation])
+def _positive(before: Arrays, after: Arrays, *, observation: str) -> NDArray[Any]:
+    return np.asarray(after[observation] > 0)
 
 
-def _distance(observation: str) -> Reward:
-    return lambda before, after: np.asarray(np.abs(after[observation] - before[observation]).sum(axis=1))
+def _changed(before: Arrays, after: Arrays, *, observation: str) -> NDArray[Any]:
+    return np.asarray(after[observation] != before[observation])
 
 
-def _increase(observation: str, active: str) -> Reward:
-    def increase(before: Arrays, after: Arrays) -> NDArray[Any]:
-        return np.where(_acts(before, after, active), after[observation] - before[observation], 0.0)
-
-    return increase
+def _distance(before: Arrays, after: Arrays, *, observation: str) -> NDArray[Any]:
+    return np.asarray(np.abs(after[observation] - before[observation]).sum(axis=1))
 
 
-def _approach(target: str, targets_left: str, active: str, none_beyond_m: float) -> Reward:
-    def approach(before: Arrays, after: Arrays) -> NDArray[Any]:
-        was_m = np.linalg.norm(before[target], axis=1)
-        is_m = np.linalg.norm(after[target], axis=1)
-        # After reaching a target, an agent observes the next one, at an unrelated distance.
-        is_there = after[targets_left] < before[targets_left]
-        has_one = (was_m < none_beyond_m) & (is_m < none_beyond_m) & _acts(before, after, active)
-        return np.where(has_one, np.where(is_there, was_m, was_m - is_m), 0.0)
-
-    return approach
+def _increase(before: Arrays, after: Arrays, *, observation: str, active: str) -> NDArray[Any]:
+    return np.where(_acts(before, after, active), after[observation] - before[observation], 0.0)
 
 
-def _near(positions: str, ids: str, separations: str) -> Reward:
-    def near(before: Arrays, after: Arrays) -> NDArray[Any]:
-        distance_m = np.linalg.norm(after[positions], axis=2)
-        is_near = (after[ids] >= 0) & (distance_m < after[separations])
-        return np.asarray(is_near.sum(axis=1))
+def _approach(
+    before: Arrays, after: Arrays, *, target: str, targets_left: str, active: str, none_beyond_m: float
+) -> NDArray[Any]:
+    was_m = np.linalg.norm(before[target], axis=1)
+    is_m = np.linalg.norm(after[target], axis=1)
+    # After reaching a target, an agent observes the next one, at an unrelated distance.
+    is_there = after[targets_left] < before[targets_left]
+    has_one = (was_m < none_beyond_m) & (is_m < none_beyond_m) & _acts(before, after, active)
+    return np.where(has_one, np.where(is_there, was_m, was_m - is_m), 0.0)
 
-    return near
+
+def _near(before: Arrays, after: Arrays, *, positions: str, ids: str, separations: str) -> NDArray[Any]:
+    distance_m = np.linalg.norm(after[positions], axis=2)
+    is_near = (after[ids] >= 0) & (distance_m < after[separations])
+    return np.asarray(is_near.sum(axis=1))
 
 
 def _acts(before: Arrays, after: Arrays, active: str) -> NDArray[Any]:
@@ -69,7 +66,7 @@ def _acts(before: Arrays, after: Arrays, active: str) -> NDArray[Any]:
 
 
 #: The measures of terms, by the names by which worlds declare them.
-_MEASURES: dict[str, Callable[..., Reward]] = {
+_MEASURES: dict[str, Callable[..., NDArray[Any]]] = {
     "value": _value,
     "positive": _positive,
     "changed": _changed,
@@ -94,7 +91,7 @@ def _form(measure: Mapping[str, Any]) -> tuple[Reward, frozenset[str]]:
     """Returns the function of a declared measure, and the observations that it needs: all of its words."""
     arguments = {name: value for name, value in measure.items() if name != "kind"}
     needs = frozenset(value for value in arguments.values() if isinstance(value, str))
-    return _MEASURES[measure["kind"]](**arguments), needs
+    return partial(_MEASURES[measure["kind"]], **arguments), needs
 
 
 def _declared_terms() -> dict[str, Term]:
@@ -142,16 +139,22 @@ def combine_rewards(terms: Mapping[str, float] | Reward, observed: set[str]) -> 
 
     if not chosen:
         raise input_error("rewards", "no term is given", f"give weights to some of {', '.join(TERMS)}, or a function")
-    (first, first_weight), *others = chosen
+    return _WeightedSum(chosen)
 
-    def total(before: Arrays, after: Arrays) -> NDArray[Any]:
+
+class _WeightedSum:
+    """The weighted sum of terms: a class, because environments are pickled, and functions in functions cannot be."""
+
+    def __init__(self, terms: list[tuple[Reward, float]]) -> None:
+        self._first, *self._others = terms
+
+    def __call__(self, before: Arrays, after: Arrays) -> NDArray[Any]:
         # One term is the usual case, and a step of ten agents costs no more than a few NumPy calls.
-        total_rewards = first_weight * first(before, after)
-        for term, weight in others:
-            total_rewards = total_rewards + weight * term(before, after)
-        return total_rewards
-
-    return total
+        term, weight = self._first
+        total = weight * term(before, after)
+        for term, weight in self._others:
+            total = total + weight * term(before, after)
+        return total
 
 
 def compute_rewards(reward: Reward, before: Arrays, after: Arrays, agents: int) -> NDArray[np.float64]:
