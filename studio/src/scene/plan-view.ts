@@ -30,6 +30,11 @@ export class PlanView {
     return this.#words.counts.drawn;
   }
 
+  /** Has the next picture not depend on those before: it does not follow them. */
+  forgetPlaces(): void {
+    this.#words.forgetPlaces();
+  }
+
   drawGrid(strokes: Strokes, state: PlanState): void {
     drawGraticule(strokes, this.#words.lines(this.#context(state)), state.palette);
   }

@@ -60,6 +60,11 @@ export class PlanWords {
     this.#units = unitsOf(scene.traffic!);
   }
 
+  /** Places data blocks anew at the next picture: it shows what it would if it were the first one. */
+  forgetPlaces(): void {
+    this.#last.clear();
+  }
+
   lines({ scene, camera, size_px }: WordsContext): GraticuleLine[] {
     return graticule(scene.traffic!, camera, size_px);
   }

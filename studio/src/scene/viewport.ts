@@ -236,6 +236,7 @@ export class Viewport {
   resize(width_px: number, height_px: number): void {
     if (width_px < 2 || height_px < 2) return;
     this.#size = [width_px, height_px];
+    this.#plan?.forgetPlaces();
     this.#renderer.setSize(width_px, height_px, false);
     this.#overlay.resize(width_px, height_px, screenRatio());
     this.camera.resize(width_px, height_px);
@@ -263,6 +264,7 @@ export class Viewport {
     if (frame === this.#frame || frame.tableId !== this.#bodies?.table.id) return;
     const isFirst = this.#frame === null;
     this.#frame = frame;
+    if (isSought) this.#plan?.forgetPlaces();
     this.#trails?.push(frame.cycle, frame.positions_m, isSought);
     this.#colors?.push(frame, isSought);
     this.#completeTrails();

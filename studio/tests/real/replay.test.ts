@@ -148,7 +148,7 @@ describe.skipIf(BINARY === "")("a replay in one file", () => {
     const { page } = await openFile("office");
     await page.getByRole("searchbox", { name: "Filter agents" }).fill("2");
     await page.locator(".agents .row:not(.group)").first().click();
-    await page.locator(".inspector .problem").filter({ hasText: "robots 1, 8 in all cycles" }).waitFor();
+    await page.locator(".inspector p").filter({ hasText: "robots 1, 8 in all cycles" }).waitFor();
     await page.context().close();
   });
 
