@@ -169,7 +169,11 @@ fn band_axes(figure: &Figure, x_axis: Axis, y_axis: Axis) -> (Axis, Axis) {
     let ends = |point: &Point| point.interval.unwrap_or((point.y, point.y));
     let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
     let most = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::NEG_INFINITY, f64::max);
-    let x = [least(&mut points().map(|p| p.x)), most(&mut points().map(|p| p.x))];
+    let mut x = [least(&mut points().map(|p| p.x)), most(&mut points().map(|p| p.x))];
+    // A series begins with the cycle after the start, which a reader takes for the start.
+    if x[0] > 0.0 && x[0] < AXIS_MARGIN * x[1] {
+        x[0] = 0.0;
+    }
     let high = most(&mut points().map(|p| ends(p).1));
     let mut low = least(&mut points().map(|p| ends(p).0));
     let lowest_mean = least(&mut points().map(|p| p.y));

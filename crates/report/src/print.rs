@@ -149,6 +149,9 @@ impl PrintStyle {
             legend.seed = self.label(&legend.seed);
             legend.mean = self.label(&legend.mean) + &runs;
         }
+        if let FigureKind::Forest { words, .. } = &mut figure.kind {
+            words.heading += &runs;
+        }
         figure
     }
 

@@ -1,5 +1,5 @@
-//! The looks of series that differ by factors: a color for each level of the first one, a marker and dashes for each level
-//! of the others.
+//! The looks of series that differ by factors: a color for each level of one of them, a marker and dashes for each level of
+//! the others.
 
 use sidestep_document::Series;
 use sidestep_draw::{LegendGroup, LegendLook, SeriesLook, series_colors};
@@ -34,24 +34,40 @@ impl SeriesLooks {
         if all.len() < 2 || !all.iter().all(is_same) {
             return None;
         }
-        let first = DistinctWords::new(all.iter().map(|levels| levels[0].1.to_string()));
-        let others = DistinctWords::new(all.iter().map(|levels| {
-            let values: Vec<&str> = levels[1..].iter().map(|(_, value)| *value).collect();
-            values.join(", ")
-        }));
         let own_look = |number: usize| {
             let SeriesLook { color, marker, dash } = SeriesLook::of_series(number);
             LegendLook { color: Some(color), marker: Some(marker), dash }
         };
-        if factors.len() == 1 {
-            let looks = first.numbers.iter().map(|number| SeriesLook::of_series(*number)).collect();
-            let legend = vec![first.into_group(factors[0], own_look)];
-            return Some(Self { looks, legend });
+        if let [factor] = factors[..] {
+            let words = DistinctWords::new(all.iter().map(|levels| levels[0].1.to_string()));
+            let looks = words.numbers.iter().map(|number| SeriesLook::of_series(*number)).collect();
+            return Some(Self { looks, legend: vec![words.into_group(factor, own_look)] });
         }
-        if others.words.len() > MAX_PATTERNS || first.words.len() > series_colors().len() {
+        // Methods are what a reader compares, and often lie over each other: colors part them better than dashes.
+        let is_number =
+            |factor: usize| all.iter().all(|levels| levels[factor].1.parse::<f64>().is_ok());
+        let mut order: Vec<usize> = (0..factors.len()).collect();
+        order.sort_by_key(|factor| is_number(*factor));
+        order
+            .into_iter()
+            .find_map(|color_factor| Self::from_colors_of(color_factor, &all, &factors))
+    }
+
+    /// Returns looks whose colors are the levels of one factor, and whose patterns are those of all others; `None` if there
+    /// are not so many colors or patterns.
+    fn from_colors_of(factor: usize, all: &[Levels<'_>], factors: &[&str]) -> Option<Self> {
+        let colored = DistinctWords::new(all.iter().map(|levels| levels[factor].1.to_string()));
+        let without_factor = |words: &mut dyn Iterator<Item = &str>| -> String {
+            let others = words.enumerate().filter(|(k, _)| *k != factor).map(|(_, word)| word);
+            others.collect::<Vec<_>>().join(", ")
+        };
+        let others = DistinctWords::new(
+            all.iter().map(|levels| without_factor(&mut levels.iter().map(|(_, value)| *value))),
+        );
+        if others.words.len() > MAX_PATTERNS || colored.words.len() > series_colors().len() {
             return None;
         }
-        let pairs = first.numbers.iter().zip(&others.numbers);
+        let pairs = colored.numbers.iter().zip(&others.numbers);
         let looks = pairs
             .map(|(&color, &pattern)| SeriesLook { color, marker: pattern, dash: pattern })
             .collect();
@@ -59,8 +75,8 @@ impl SeriesLooks {
         let pattern =
             |number: usize| LegendLook { color: None, marker: Some(number), dash: number };
         let legend = vec![
-            first.into_group(factors[0], color),
-            others.into_group(&factors[1..].join(", "), pattern),
+            colored.into_group(factors[factor], color),
+            others.into_group(&without_factor(&mut factors.iter().copied()), pattern),
         ];
         Some(Self { looks, legend })
     }
@@ -120,12 +136,26 @@ mod tests {
     fn two_factors_are_colors_and_patterns_each_told_once() {
         let found = looks(&["n=6, rule = a", "n=6, rule = b", "n=12, rule = a", "n=12, rule = b"]);
         let pairs: Vec<_> = found.looks.iter().map(|look| (look.color, look.dash)).collect();
-        assert_eq!(pairs, [(0, 0), (0, 1), (1, 0), (1, 1)]);
+        assert_eq!(pairs, [(0, 0), (1, 0), (0, 1), (1, 1)]);
         let [colors, patterns] = &found.legend[..] else { panic!("two groups") };
-        assert_eq!((colors.heading.as_str(), labels(colors)), ("n", vec!["6", "12"]));
-        assert_eq!((patterns.heading.as_str(), labels(patterns)), ("rule", vec!["a", "b"]));
+        assert_eq!((colors.heading.as_str(), labels(colors)), ("rule", vec!["a", "b"]));
+        assert_eq!((patterns.heading.as_str(), labels(patterns)), ("n", vec!["6", "12"]));
         assert_eq!(colors.entries[1].0, LegendLook { color: Some(1), marker: None, dash: 0 });
         assert_eq!(patterns.entries[1].0, LegendLook { color: None, marker: Some(1), dash: 1 });
+    }
+
+    #[test]
+    fn colors_go_to_methods_unless_there_are_too_many_numbers_for_patterns() {
+        let names: Vec<String> = (0..2 * (MAX_PATTERNS + 1))
+            .map(|k| format!("n={}, rule={}", k / 2, ["a", "b"][k % 2]))
+            .collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let headings = |names: &[&str]| -> Vec<String> {
+            looks(names).legend.into_iter().map(|group| group.heading).collect()
+        };
+        assert_eq!(headings(&names), ["n", "rule"]);
+        assert_eq!(headings(&names[2..]), ["rule", "n"]);
+        assert_eq!(headings(&["n=1, m=2", "n=2, m=2"]), ["n", "m"], "numbers alone in their order");
     }
 
     #[test]
@@ -136,7 +166,7 @@ mod tests {
         // A legend shows what is drawn: a whole line.
         let shown = LegendLook { color: Some(1), marker: Some(1), dash: 0 };
         assert_eq!(found.legend[0].entries[1].0, shown);
-        let many: Vec<String> = (0..6).map(|k| format!("n=1, rule={k}")).collect();
+        let many: Vec<String> = (0..6).map(|k| format!("n={k}, rule={k}")).collect();
         let many: Vec<&str> = many.iter().map(String::as_str).collect();
         for names in [&["mvp", "pc"][..], &["n=6", "rule=a"], &["n=6", "pc"], &["n=6"], &[], &many]
         {

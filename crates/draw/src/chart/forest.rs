@@ -318,6 +318,12 @@ fn bound_words(text: &str) -> String {
     bound
 }
 
+/// Returns an effect with its sign and about three digits: its text has the whole number.
+fn signed_words(value: f64) -> String {
+    let decimals = if value.abs() < 10.0 { 2 } else { 0 };
+    format!("{value:+.decimals$}").replace('-', "\u{2212}")
+}
+
 /// Least height that a style may have: the rows decide.
 const MIN_HEIGHT_PX: f64 = 100.0;
 
@@ -347,7 +353,15 @@ impl MarkPlace {
             self.arrow(frame, right, 1.0, color);
         }
         let at = self.x.px(mark.value);
-        if at < left - 0.5 || at > right + 0.5 {
+        if at < left - 0.5 {
+            // A number beside the arrow is the mark that the axis has no room for.
+            let aside_px = interval.map_or(left, |(_, high)| self.x.px(high).clamp(left, right));
+            self.write_value(frame, mark.value, (aside_px, 1.0));
+            return;
+        }
+        if at > right + 0.5 {
+            let aside_px = interval.map_or(right, |(low, _)| self.x.px(low).clamp(left, right));
+            self.write_value(frame, mark.value, (aside_px, -1.0));
             return;
         }
         let has_zero = interval.is_some_and(|(low, high)| low <= 0.0 && high >= 0.0);
@@ -356,6 +370,15 @@ impl MarkPlace {
             // The same marker, smaller and in the color of the ground, leaves a rim.
             marker.draw(&mut frame.svg, (at, self.y), 0.55 * self.radius, GROUND);
         }
+    }
+
+    /// Writes a value, in units of the axis, to one side of a place.
+    fn write_value(&self, frame: &mut ChartFrame, value: f64, (x, side): (f64, f64)) {
+        let size = self.radius / MARK_FRACTION;
+        let anchor = if side < 0.0 { Anchor::End } else { Anchor::Start };
+        let style = TextStyle { fill: INK, halo: true, ..TextStyle::new(size, anchor) };
+        let words = signed_words(value);
+        frame.svg.text(x + side * 0.8 * size, self.y + style.middle_px(), &words, &style);
     }
 
     /// Draws the head of an arrow that points out of the area.
@@ -392,6 +415,10 @@ mod tests {
         assert_eq!(drawn.svg.matches("<circle").count(), 4);
         assert_eq!((drawn.spots.len(), drawn.svg.matches(">+5.0</text>").count()), (4, 4));
         assert!(drawn.svg.contains("Z\" fill=\"#0072B2\""), "{}", drawn.svg);
+        assert!(drawn.svg.contains(">+900</text>"), "the arrow says how far: {}", drawn.svg);
+        let below = chart([5.0, 0.5, 6.0, -1234.5], "").draw(&Style::CHART).unwrap().svg;
+        assert!(below.contains(">\u{2212}1234</text>"), "{below}");
+        assert_eq!(signed_words(-1.256), "\u{2212}1.26");
     }
 
     #[test]

@@ -143,7 +143,8 @@ fn note(metrics: &[MetricSummary], remark: &str) -> String {
     let holm = if has_p(metrics) { " and p, adjusted by Holm" } else { "" };
     let text = format!(
         "Mean differences on the same seeds with 95 % intervals, {count} pairs; hollow where the interval has zero in \
-         it. On the right in the unit of the metric{holm}. An arrow: it lies beyond the axis. {remark}"
+         it. On the right in the unit of the metric{holm}. An arrow leads beyond the axis; a number beside it is the \
+         difference. {remark}"
     );
     text.trim_end().to_string()
 }
@@ -199,7 +200,7 @@ impl EffectUnit {
     /// Returns why an effect has no mark, in few letters: there is little room.
     fn unmarked(self) -> &'static str {
         match self {
-            Self::Percent => "mean \u{2248} 0",
+            Self::Percent => "baseline \u{2248} 0",
             Self::StandardDeviations => "equal runs",
         }
     }
