@@ -188,14 +188,14 @@ impl Arm {
         }
         let files = ArmFiles { urdf, base, tip, srdf, group };
         let model = files.load().map_err(|e| option_error(&e))?;
-        // Both are readable, or the model could not have been loaded.
-        let with_text = |path: &PathBuf| {
-            let text = std::fs::read_to_string(path).unwrap_or_default();
-            (std::path::absolute(path).unwrap_or_else(|_| path.clone()), text)
+        let with_text = |path: &PathBuf| -> PyResult<(PathBuf, String)> {
+            let text = std::fs::read_to_string(path);
+            let failed = |e| error::RecordError::new_err(format!("{}: {e}", path.display()));
+            Ok((std::path::absolute(path).unwrap_or_else(|_| path.clone()), text.map_err(failed)?))
         };
         let source = ArmSource {
-            urdf: with_text(&files.urdf),
-            srdf: files.srdf.as_ref().map(with_text),
+            urdf: with_text(&files.urdf)?,
+            srdf: files.srdf.as_ref().map(with_text).transpose()?,
             base: files.base,
             tip: files.tip,
             group: files.group,

@@ -166,28 +166,30 @@ const AXIS_MARGIN: f64 = 0.04;
 /// pull the axis there.
 fn band_axes(figure: &Figure, x_axis: Axis, y_axis: Axis) -> (Axis, Axis) {
     let points = || figure.series.iter().flat_map(|s| &s.points).filter(|p| p.y.is_finite());
-    let ends = |point: &Point| point.interval.unwrap_or((point.y, point.y));
-    let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
-    let most = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::NEG_INFINITY, f64::max);
-    let mut x = [least(&mut points().map(|p| p.x)), most(&mut points().map(|p| p.x))];
+    let ends = |point: &Point| {
+        let (low, high) = point.interval.unwrap_or((point.y, point.y));
+        [low, high]
+    };
+    let (Some(mut x), Some((lowest_mean, _)), Some((mut low, high))) = (
+        extent(points().map(|p| p.x)),
+        extent(points().map(|p| p.y)),
+        extent(points().flat_map(ends)),
+    ) else {
+        return (x_axis, y_axis);
+    };
     // A series begins with the cycle after the start, which a reader takes for the start.
-    if x[0] > 0.0 && x[0] < AXIS_MARGIN * x[1] {
-        x[0] = 0.0;
+    if x.0 > 0.0 && x.0 < AXIS_MARGIN * x.1 {
+        x.0 = 0.0;
     }
-    let high = most(&mut points().map(|p| ends(p).1));
-    let mut low = least(&mut points().map(|p| ends(p).0));
-    let lowest_mean = least(&mut points().map(|p| p.y));
     let margin = AXIS_MARGIN * (high - low);
     // Zero belongs to an axis that comes near it.
     low = if lowest_mean >= 0.0 && low < 0.4 * high { 0.0 } else { low - margin };
     // What differs by rounding alone is one value, around which an axis makes room by itself.
-    let is_range = |from: f64, to: f64| {
-        from.is_finite() && to.is_finite() && to - from > MAX_ROUNDING * from.abs().max(to.abs())
-    };
+    let is_range = |from: f64, to: f64| to - from > MAX_ROUNDING * from.abs().max(to.abs());
     let is_linear = |scale: Scale| scale == Scale::Linear;
-    let has_x = is_linear(figure.x_scale) && is_range(x[0], x[1]);
+    let has_x = is_linear(figure.x_scale) && is_range(x.0, x.1);
     let has_y = is_linear(figure.y_scale) && is_range(low, high);
-    let x_axis = if has_x { x_axis.range(x[0], x[1]) } else { x_axis };
+    let x_axis = if has_x { x_axis.range(x.0, x.1) } else { x_axis };
     let y_axis = if has_y { y_axis.range(low, high + margin) } else { y_axis };
     (x_axis, y_axis)
 }

@@ -57,7 +57,6 @@ export class GlassLayer {
     triangle.setAttribute("position", new BufferAttribute(new Float32Array(9), 3));
     this.mesh = new Mesh(triangle, look);
     this.mesh.frustumCulled = false;
-    this.mesh.renderOrder = 0;
   }
 
   /** The bodies have other colors: the next image is drawn anew. */

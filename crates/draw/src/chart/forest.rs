@@ -353,15 +353,12 @@ impl MarkPlace {
             self.arrow(frame, right, 1.0, color);
         }
         let at = self.x.px(mark.value);
-        if at < left - 0.5 {
-            // A number beside the arrow is the mark that the axis has no room for.
-            let aside_px = interval.map_or(left, |(_, high)| self.x.px(high).clamp(left, right));
-            self.write_value(frame, mark.value, (aside_px, 1.0));
-            return;
-        }
-        if at > right + 0.5 {
-            let aside_px = interval.map_or(right, |(low, _)| self.x.px(low).clamp(left, right));
-            self.write_value(frame, mark.value, (aside_px, -1.0));
+        let is_left = at < left - 0.5;
+        if is_left || at > right + 0.5 {
+            // The mark that the axis has no room for is a number, beside what is seen of its interval.
+            let (inner, side) = if is_left { (high, 1.0) } else { (low, -1.0) };
+            let end_px = self.x.px(inner).clamp(left, right);
+            self.write_value(frame, mark.value, (end_px, side));
             return;
         }
         let has_zero = interval.is_some_and(|(low, high)| low <= 0.0 && high >= 0.0);
