@@ -53,6 +53,8 @@ export function drawGraticule(strokes: Strokes, lines: readonly GraticuleLine[],
 export class PlanWords {
   readonly #units: PlanUnits;
   readonly #last: LastPlaces = new Map();
+  /** The scale and the size of the last picture. */
+  #lastScale = "";
   /** Number of data blocks of the last picture, and of those without a place. */
   counts = { drawn: 0, leftOut: 0 };
 
@@ -192,6 +194,10 @@ export class PlanWords {
     });
     const area = { x: LEFT_PX, y: 2, width: size_px[0] - 8, height: size_px[1] - profile_px - BOTTOM_PX };
     const obstacles = { area, taken, vectors, symbol_px: SYMBOL_PX };
+    // At another scale blocks move against their aircraft anyway: the picture does not depend on how it was reached.
+    const scale = [camera.mPerPx, ...size_px, profile_px].join();
+    if (scale !== this.#lastScale) this.#last.clear();
+    this.#lastScale = scale;
     const placed = placeBlocks(blocks.slice(0, MAX_BLOCKS), obstacles, LINE_PX, this.#last);
     this.counts = { drawn: placed.length, leftOut: blocks.length - placed.length };
     pen.textAlign = "left";
