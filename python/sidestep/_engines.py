@@ -258,7 +258,7 @@ class RayExecutor(Executor):
         try:
             ray: Any = importlib.import_module("ray")
         except ImportError as error:
-            raise ImportError("engine=\"ray\" needs Ray: pip install 'sidestep[ray]'") from error
+            raise ImportError("engine=\"ray\" needs Ray: pip install 'ray>=2.30'") from error
         if not ray.is_initialized():
             ray.init(log_to_driver=False)
         self._ray = ray

@@ -1,4 +1,4 @@
-"""Figures of runs, with Matplotlib: tracks, separation, groups. Needs the extra ``plot``: ``pip install 'sidestep[plot]'``.
+"""Figures of runs, with Matplotlib: tracks, separation, groups. Needs Matplotlib: ``pip install 'matplotlib>=3.7'``.
 
 Each function draws into ``ax``, or into a new figure, and returns the axes. The figures show the rows that
 a run has recorded: its folder, or the tables of ``Simulation.tables()`` or :func:`sidestep.read`.
@@ -52,7 +52,7 @@ def _axes(ax: Any) -> Any:
     try:
         pyplot = importlib.import_module("matplotlib.pyplot")
     except ImportError as error:
-        raise ImportError("figures need Matplotlib: pip install 'sidestep[plot]'") from error
+        raise ImportError("figures need Matplotlib: pip install 'matplotlib>=3.7'") from error
     return pyplot.subplots()[1]
 
 

@@ -35,7 +35,8 @@ def external():
 @pytest.fixture
 def command():
     """The path of the command that was built with the package."""
-    path = os.environ.get("SIDESTEP_BINARY") or ROOT / "target" / "release" / "sidestep"
+    name = "sidestep.exe" if os.name == "nt" else "sidestep"
+    path = os.environ.get("SIDESTEP_BINARY") or ROOT / "target" / "release" / name
     if not pathlib.Path(path).exists():
         if "package" in os.environ.get("SIDESTEP_REQUIRE", ""):
             pytest.fail(f"no command at {path}")

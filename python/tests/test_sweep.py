@@ -176,6 +176,12 @@ def test_what_cannot_be_swept_is_an_error_before_any_run(options, words, floor):
     assert words in str(caught.value)
 
 
+#: Windows has no signal that kills; there SIGTERM to another process ends it at once.
+KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
+signals = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+
+@signals
 def test_ctrl_c_stops_a_sweep_with_what_is_finished_in_the_journal(floor, tmp_path):
     out = tmp_path / "s"
 
@@ -233,6 +239,7 @@ with test_sweep.Striking(2) as pool:
 """
 
 
+@signals
 def test_a_killed_driver_loses_nothing_that_is_in_the_journal(floor, tmp_path):
     out = tmp_path / "s"
     here = pathlib.Path(__file__).parent
@@ -387,7 +394,7 @@ class Killing(ProcessPoolExecutor):
     def submit(self, fn, /, *args, **kwargs):
         type(self).left -= 1
         if type(self).left == 0:
-            os.kill(next(iter(self._processes)), signal.SIGKILL)
+            os.kill(next(iter(self._processes)), KILL)
         return super().submit(fn, *args, **kwargs)
 
 
@@ -542,7 +549,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_table(floor, tmp_path
             while not done.is_set() and not begun(tmp_path / "dask"):
                 time.sleep(0.01)
             at_kill.append(begun(tmp_path / "dask"))
-            os.kill(worker.pid, signal.SIGKILL)
+            os.kill(worker.pid, KILL)
 
         thread = threading.Thread(target=kill, daemon=True)
         thread.start()
