@@ -4,9 +4,10 @@ use crate::arrays::{UnsignedArg, order_values};
 use crate::error::{self, argument_error};
 use crate::json::{to_list, to_python};
 use crate::pickle::{self, Pickle};
+use crate::picture::{Pictures, parse_look, to_pixels};
 use crate::scenario::{Bundle, LoadedScenario, Scenario, load, unpack_scenario};
 use crate::space::{OutArrays, Team, zeroed_arrays};
-use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods, ToPyArray};
+use numpy::{PyArray1, PyArray3, PyReadonlyArray1, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use sidestep::kernel::batch::{self, BatchError, SimulationFactory};
@@ -51,6 +52,7 @@ pub(crate) struct Batch {
     worlds: usize,
     workers: usize,
     batch: Mutex<batch::Batch>,
+    pictures: Pictures,
 }
 
 impl Batch {
@@ -78,7 +80,8 @@ impl Batch {
         let batch = batch.map_err(|e| batch_error(&e))?;
         let teams = batch.agent_teams().iter().cloned().map(Arc::new).collect();
         let worlds = seeds.len();
-        Ok(Self { scenario, teams, worlds, workers, batch: Mutex::new(batch) })
+        let pictures = Pictures::default();
+        Ok(Self { scenario, teams, worlds, workers, batch: Mutex::new(batch), pictures })
     }
 
     /// Starts a world with each of the seeds, and continues it from a state.
@@ -257,13 +260,51 @@ impl Batch {
         self.with_worlds(py, |batch| batch.map_worlds(|run| run.digest().to_string()))
     }
 
-    /// Returns the measurements of each world so far, a list of dicts.
+    /// Returns the measurements of each world so far, a list of dicts; with `mask` (bool, one for each world) None for those
+    /// for which it is false.
     ///
     /// >>> [world["actions"] for world in batch.metrics()]
     /// [2, 2, 2]
-    fn metrics(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let all = self.with_worlds(py, |batch| batch.map_worlds(|run| run.metrics()))?;
+    #[pyo3(signature = (*, mask=None))]
+    fn metrics(&self, py: Python<'_>, mask: Option<&Bound<'_, PyAny>>) -> PyResult<Py<PyAny>> {
+        let mask = self.parse_mask(mask)?;
+        let is_asked = |world: usize| mask.as_ref().is_none_or(|mask| mask[world]);
+        let all: Vec<_> = self.with_worlds(py, |batch| {
+            let metrics = |world: usize| {
+                let asked = is_asked(world).then(|| batch.with_world(world, |run| run.metrics()));
+                asked.unwrap_or(Ok(serde_json::Value::Null))
+            };
+            (0..self.worlds).map(metrics).collect()
+        })?;
         to_python(py, &serde_json::Value::from(all))
+    }
+
+    /// Renders the present state of a world as an image: an array (height, width, 3) of red, green and blue (uint8). The
+    /// other arguments are those of `Simulation.render`.
+    ///
+    /// Raises InputError when there is no such world, or as `Simulation.render`.
+    ///
+    /// >>> batch.render(2, 100).shape[1:]
+    /// (100, 3)
+    #[pyo3(signature = (world=0, width=640, *, size=None, agents=Vec::new(), view=None))]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        world: usize,
+        width: u32,
+        size: Option<[u32; 2]>,
+        agents: Vec<u32>,
+        view: Option<&str>,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        if world >= self.worlds {
+            let remedy = format!("give a number from 0 to {}", self.worlds - 1);
+            return Err(argument_error("world", format!("there is no world {world}"), remedy));
+        }
+        let look = parse_look(width, size, agents, view)?;
+        let drawn = self
+            .with_worlds(py, |batch| batch.with_world(world, |run| self.pictures.draw(run, look)));
+        let (still, size_px) = drawn??;
+        to_pixels(py, &still, size_px)
     }
 
     /// Gives an order to all agents of a team (by number or name) in all worlds for the next step: an array of the

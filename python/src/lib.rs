@@ -12,7 +12,7 @@
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
 //! json.rs        values of other kinds      notebook.rs     output of notebook cells
 //! result.rs      results, by name           choice.rs       words that choose a value
-//! pickle.rs      what travels between processes
+//! pickle.rs      what travels between processes            picture.rs      states -> pixels
 //! error.rs       the exceptions             watch.rs        Ctrl-C
 //! worlds.rs      the list of worlds, and what each declares
 //! ```
@@ -33,6 +33,7 @@ mod json;
 mod learn;
 mod notebook;
 mod pickle;
+mod picture;
 mod policy;
 mod read;
 mod result;

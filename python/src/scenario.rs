@@ -387,6 +387,20 @@ impl Scenario {
         Ok(&self.0.source()?.text)
     }
 
+    /// Returns its keys with all values that are set, as a dict: what `Scenario` takes.
+    ///
+    /// Raises InputError when its text cannot be written.
+    ///
+    /// >>> scenario.to_dict()["robots"]
+    /// [{'count': 2}]
+    fn to_dict(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let text = self.text()?;
+        let keys: serde_json::Value = toml::from_str(text).map_err(|e| {
+            argument_error("scenario", e.to_string(), "this is a bug; please report it")
+        })?;
+        to_python(py, &keys)
+    }
+
     /// Returns the JSON Schema of the scenarios of its world, as a dict.
     ///
     /// >>> "robots" in scenario.schema()["properties"]

@@ -6,24 +6,22 @@ use crate::blocks::Blocks;
 use crate::error::{self, ClosedError, argument_error};
 use crate::json::to_python;
 use crate::notebook::to_html;
+use crate::picture::{Pictures, draw_error, parse_look, to_pixels};
 use crate::policy::{IndexedTeam, PolicyRun, run_with_policies};
 use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::space::{ObservationBuffers, Team, find_team, team_at};
 use crate::table::Table;
 use crate::watch::{SignalWatcher, TimeSlice};
 use crate::worlds;
-use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use sidestep::kernel::control::{self, MultiAgentOrder};
 use sidestep::kernel::ports::{ColumnValues, TableSchema};
-use sidestep::kernel::view::{AgentNumber, Body, BodyId, FrameOptions};
+use sidestep::kernel::view::{Body, BodyId, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, RunConfig, Simulation as AnySimulation};
 use sidestep::scenario::{ResolvedScenario, Source};
-use sidestep_draw::{
-    AnimationFrame, AnimationLook, AnimationRenderer, AnimationSize, DrawError, PictureView,
-    TrailChoice,
-};
+use sidestep_draw::{AnimationFrame, AnimationLook};
 use sidestep_session::{ManagedRun, OutputPaths, RowSelection};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -60,8 +58,7 @@ pub(crate) struct Simulation {
     teams: Vec<Arc<control::AgentTeam>>,
     /// `None` when it is closed.
     run: Mutex<Option<ManagedRun>>,
-    /// The renderer of its pictures, with their look: kept, since it draws the scenery once for all pictures.
-    renderer: Mutex<Option<(AnimationLook, AnimationRenderer)>>,
+    pictures: Pictures,
 }
 
 impl Simulation {
@@ -90,7 +87,7 @@ impl Simulation {
         })?;
         let teams = run.simulation().agent_teams().iter().cloned().map(Arc::new).collect();
         let run = Mutex::new(Some(run));
-        Ok(Self { scenario, workers, teams, run, renderer: Mutex::default() })
+        Ok(Self { scenario, workers, teams, run, pictures: Pictures::default() })
     }
 
     /// Works with the run while other threads of Python run.
@@ -203,26 +200,7 @@ impl Simulation {
     }
 
     fn draw(&self, py: Python<'_>, look: AnimationLook) -> PyResult<(AnimationFrame, (u32, u32))> {
-        self.with_run(py, |run| {
-            let simulation = run.simulation_mut();
-            let frame = simulation.frame(FrameOptions::WITHOUT_SCANS);
-            let scenery = simulation.scenery();
-            AgentNumber::check_all(&look.trails.agents, &scenery, &frame.bodies)
-                .map_err(|e| argument_error("agents", e.cause(), e.remedy()))?;
-            // Without a floor the view is that of the present state, which a kept renderer has not.
-            let is_kept = scenery.floor.is_some();
-            let mut kept = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
-            let renderer = match kept.take() {
-                Some((kept_look, renderer)) if is_kept && kept_look == look => renderer,
-                _ => AnimationRenderer::new(scenery, std::slice::from_ref(&frame), &look)
-                    .map_err(|e| look_error(&e, look.size))?,
-            };
-            let caption = format!("cycle {}", frame.cycle);
-            let still = renderer.render(&frame, &[], &caption).map_err(|e| draw_error(&e))?;
-            let size = renderer.size_px();
-            *kept = Some((look, renderer));
-            Ok((still, size))
-        })
+        self.with_run(py, |run| self.pictures.draw(run.simulation_mut(), look))
     }
 
     /// Returns the end: `until`, or else the one planned by the scenario.
@@ -281,49 +259,6 @@ fn refuse_repeated(agents: &[EntityId]) -> PyResult<()> {
         }
         None => Ok(()),
     }
-}
-
-/// Returns the look of a picture from the arguments of `render`.
-fn parse_look(
-    width: u32,
-    size: Option<[u32; 2]>,
-    agents: Vec<u32>,
-    view: Option<&str>,
-) -> PyResult<AnimationLook> {
-    let view = match view.map(str::parse::<PictureView>) {
-        None => PictureView::Usual,
-        Some(Ok(view)) => view,
-        Some(Err(cause)) => {
-            let remedy = "give \"top\", \"side\", \"front\" or angles, like \"-60,30\"";
-            return Err(argument_error("view", cause, remedy));
-        }
-    };
-    let agents = agents.into_iter().map(|number| AgentNumber { number, part: None }).collect();
-    let trails = TrailChoice { agents, from: None };
-    Ok(AnimationLook {
-        size: size.map_or(AnimationSize::LongerSide(width), AnimationSize::Exact),
-        trails,
-        view,
-    })
-}
-
-/// Returns the error of a picture that cannot be drawn, with the argument that is wrong.
-fn look_error(error: &DrawError, size: AnimationSize) -> PyErr {
-    match error {
-        DrawError::FlatView(_) => {
-            argument_error("view", error.to_string(), "give \"top\", or leave it out")
-        }
-        _ if matches!(size, AnimationSize::Exact(_)) => {
-            let remedy =
-                "give a width and a height of at most 4096 pixels, with room for the line of text";
-            argument_error("size", error.to_string(), remedy)
-        }
-        _ => argument_error("width", error.to_string(), "give 1 to 4096 pixels"),
-    }
-}
-
-fn draw_error(error: &DrawError) -> PyErr {
-    error::RecordError::new_err(error.to_string())
 }
 
 /// Returns a dict of tables by name, also of those without rows.
@@ -622,10 +557,8 @@ impl Simulation {
         view: Option<&str>,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let py = slf.py();
-        let (still, (width, height)) = slf.draw(py, parse_look(width, size, agents, view)?)?;
-        let opaque = still.rgba().chunks_exact(4).flat_map(|pixel| &pixel[..3]);
-        let pixels: Vec<u8> = opaque.copied().collect();
-        PyArray1::from_vec(py, pixels).reshape([height as usize, width as usize, 3])
+        let (still, size_px) = slf.draw(py, parse_look(width, size, agents, view)?)?;
+        to_pixels(py, &still, size_px)
     }
 
     /// The same as `render`.

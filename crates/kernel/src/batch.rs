@@ -295,6 +295,25 @@ impl Batch {
         Ok(values)
     }
 
+    /// Returns the result of `use_run` for one world, such as a picture of it.
+    ///
+    /// # Errors
+    /// When it has broken off.
+    ///
+    /// # Panics
+    /// When there is no such world.
+    pub fn with_world<T>(
+        &self,
+        index: usize,
+        use_run: impl FnOnce(&mut dyn Simulation) -> T,
+    ) -> Result<T, BatchError> {
+        let mut world = self.world(index);
+        match world.run.as_deref_mut() {
+            Some(run) => Ok(use_run(run)),
+            None => Err(world.broken_world_error(index)),
+        }
+    }
+
     fn world(&self, index: usize) -> MutexGuard<'_, BatchWorldEntry> {
         self.shared.world(index)
     }

@@ -3,7 +3,7 @@
 PettingZoo's ``ParallelEnv``, of which each world has a class (such as ``Robots``) and a module (such as ``robots_v0``), many
 worlds at once as arrays (``Batch``), and Gymnasium's ``Env`` and ``VectorEnv`` for one agent.
 
-Needs the extra ``rl``: ``pip install 'sidestep[rl]'``.
+Needs the packages of the extra ``rl``: ``pip install 'gymnasium>=1.0' 'pettingzoo>=1.24'``.
 
 >>> from sidestep.envs import parallel_env
 >>> env = parallel_env({
@@ -22,7 +22,9 @@ try:
     import gymnasium as _gymnasium
     import pettingzoo as _pettingzoo
 except ImportError as error:
-    raise ImportError("environments need gymnasium and pettingzoo: pip install 'sidestep[rl]'") from error
+    raise ImportError(
+        "environments need gymnasium and pettingzoo: pip install 'gymnasium>=1.0' 'pettingzoo>=1.24'"
+    ) from error
 
 import sys as _sys
 from typing import Any as _Any
@@ -31,6 +33,7 @@ from ._batch import Batch, VectorEnv
 from ._parallel import ENVIRONMENTS, ParallelEnv, parallel_env
 from ._rewards import DEFAULTS, TERMS, Reward, Term
 from ._single import Env
+from . import tasks
 from ._versions import versioned_module as _versioned_module
 
 __all__ = [
@@ -44,6 +47,7 @@ __all__ = [
     "Term",
     "VectorEnv",
     "parallel_env",
+    "tasks",
 ]
 
 # The classes and modules of worlds, by their names. A module is known to Python's `import` as well.

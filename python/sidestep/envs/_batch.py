@@ -46,8 +46,8 @@ class Batch:
         copy: whether returned arrays belong to the caller. Otherwise they are overwritten two steps later.
         workers: number of workers; each world is stepped by one of them.
 
-    Every world draws the seeds of its episodes from its own generator: after ``reset(seed=s)``, world ``k`` has the
-    episodes of a ``parallel_env`` reset with ``s + k``.
+    After ``reset(seed=s)``, the first episode of world ``k`` has the seed ``s + k``, and the seeds of its further episodes
+    are drawn from a generator with that seed: it has the episodes of a ``parallel_env`` reset with ``s + k``.
     """
 
     def __init__(
@@ -96,6 +96,8 @@ class Batch:
         self._as_float32 = [{name: np.zeros(raw[name].shape, np.float32) for name in self._reals} for raw in self._raw]
         self._now = 0
         self._rngs: list[np.random.Generator] = []
+        # Seeds that a caller gave for the next episode of worlds.
+        self._given_seeds: dict[int, int] = {}
         self._ended = np.ones(worlds, bool)
 
     @property
@@ -122,10 +124,12 @@ class Batch:
             self._rngs = [np.random.default_rng() for _ in range(n)]
         for k, one in enumerate(seeds):
             if one is not None and mask[k]:
+                self._given_seeds[k] = checked_int("seed", one, 0, MAX_SEED - 1)
                 self._rngs[k] = np.random.default_rng(one)
         self._restart(mask)
         self._observe()
-        return self._observed(), {}
+        self._on_restart(mask)
+        return self._observed(), self._infos_at_start(mask)
 
     def step(
         self, actions: Actions
@@ -151,22 +155,53 @@ class Batch:
         if restarting.any():
             self._restart(restarting)
         self._observe()
+        self._on_step(continuing)
         rewards = self._compute_rewards()
         rewards[restarting] = 0.0
-        terminations = self.worlds.is_over & continuing
+        if restarting.any():
+            self._on_restart(restarting)
+        terminations = self._is_over() & continuing
         truncations = ~terminations & continuing & (self.worlds.cycles >= self.max_cycles)
         self._ended = terminations | truncations
-        infos: dict[str, Any] = {}
+        infos = self._infos(self._ended)
+        restarted = restarting
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
-            ended = self._ended
-            infos = {"final_obs": self._observed(copy=True), "_final_obs": ended.copy()}
+            ended = restarted = self._ended
+            infos |= {"final_obs": self._observed(copy=True), "_final_obs": ended.copy()}
             self._restart(ended)
             # Into the same buffer: the arrays of the previous step still belong to the caller.
             self.worlds.observe(self._number, out=self._raw[self._now])
+            self._on_restart(ended)
+        if restarted.any():
+            infos |= self._infos_at_start(restarted)
         return self._observed(), rewards, terminations, truncations, infos
+
+    def render(self, world: int = 0, width: int = 480) -> NDArray[np.uint8]:
+        """Returns an image of the present state of a world, (height, width, 3)."""
+        return self.worlds.render(world, width)
 
     def close(self) -> None:
         """Does nothing: worlds have no open files."""
+
+    # What environments of tasks do otherwise.
+
+    def _on_restart(self, mask: NDArray[np.bool_]) -> None:
+        """Is called when worlds have restarted and are observed."""
+
+    def _on_step(self, mask: NDArray[np.bool_]) -> None:
+        """Is called when worlds have done a cycle and are observed."""
+
+    def _is_over(self) -> NDArray[np.bool_]:
+        """Returns whether each world's episode has ended by itself."""
+        return self.worlds.is_over
+
+    def _infos_at_start(self, mask: NDArray[np.bool_]) -> dict[str, Any]:
+        """Returns the infos of worlds that have restarted: their seeds, and as Gymnasium has it, which have one."""
+        return {"seed": np.where(mask, self.worlds.seeds, 0).astype(np.int64), "_seed": mask.copy()}
+
+    def _infos(self, ended: NDArray[np.bool_]) -> dict[str, Any]:
+        """Returns the infos of a step; ``ended`` are the worlds whose episodes have ended with it."""
+        return {}
 
     def _acting_team(self, team: str | int | None) -> int:
         teams = self.worlds.teams
@@ -201,7 +236,8 @@ class Batch:
     def _restart(self, mask: NDArray[np.bool_]) -> None:
         seeds = np.zeros(self.num_worlds, np.uint64)
         for k in np.flatnonzero(mask):
-            seeds[k] = self._rngs[k].integers(MAX_SEED)
+            given = self._given_seeds.pop(int(k), None)
+            seeds[k] = self._rngs[k].integers(MAX_SEED) if given is None else given
         self.worlds.reset(seeds, mask=mask)
         self._ended = self._ended & ~mask
 
@@ -249,9 +285,11 @@ class Batch:
 
 
 class VectorEnv(GymnasiumVectorEnv[Any, Any, Any]):
-    """Gymnasium's vector environment of a scenario with one agent that takes orders.
+    """The agents of many worlds as Gymnasium's vector environment: with one policy for all, environment
+    ``world * agents + agent`` is an agent of a world.
 
-    It takes the arguments of :class:`Batch`, with ``num_envs`` for ``worlds``; arrays have the shape (num_envs, ...).
+    It takes the arguments of :class:`Batch`, with ``num_envs`` for the environments in all, a multiple of the number of
+    agents; arrays have the shape (num_envs, ...). Agents of one world begin and end their episodes together.
     """
 
     def __init__(
@@ -260,45 +298,101 @@ class VectorEnv(GymnasiumVectorEnv[Any, Any, Any]):
         num_envs: int,
         **options: Any,
     ) -> None:
-        self.batch = Batch(scenario, num_envs, **options)
-        if len(self.batch.agents) != 1:
-            cause = f"{len(self.batch.agents)} agents take orders"
-            raise input_error("scenario", cause, "use sidestep.envs.Batch for many, or leave one")
-        self.num_envs = num_envs
-        self.single_observation_space = self.batch.single_observation_space
-        self.single_action_space = self.batch.single_action_space
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.metadata = {"autoreset_mode": self.batch.autoreset_mode, "render_modes": []}
-        self.render_mode = None
+        one = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
+        agents = len(Batch(one, 1, **options).agents)
+        self._wrap(Batch(one, worlds_of(num_envs, agents), **options))
+
+    def _wrap(self, batch: Batch) -> None:
+        self.batch = batch
+        self.num_envs = batch.num_worlds * len(batch.agents)
+        self.single_observation_space = batch.single_observation_space
+        self.single_action_space = batch.single_action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.metadata = {**self.metadata, "autoreset_mode": batch.autoreset_mode}
 
     def reset(
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[Observations, dict[str, Any]]:
-        """Starts an episode in every environment; see :meth:`Batch.reset`."""
+    ) -> tuple[Any, dict[str, Any]]:
+        """Starts an episode in every world; see :meth:`Batch.reset`.
+
+        ``seed`` is the seed of the first world, or a list with one for each world; the mask has one for each environment.
+        """
+        mask = (options or {}).get("reset_mask")
+        if mask is not None and np.shape(mask) == (self.num_envs,):
+            rows = np.asarray(mask).reshape(self.batch.num_worlds, -1)
+            options = {**(options or {}), "reset_mask": rows.any(axis=1)}
         observed, infos = self.batch.reset(seed=seed, options=options)
-        return _of_one(observed), infos
+        return _in_rows(observed), self._infos_of_rows(infos)
 
     def step(
         self, actions: Actions
-    ) -> tuple[Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Orders an action in each environment, and simulates one cycle; see :meth:`Batch.step`."""
         if isinstance(actions, Mapping):
-            given: Actions = {name: np.asarray(values)[:, None] for name, values in actions.items()}
+            given: Actions = {name: self._by_worlds(values) for name, values in actions.items()}
         else:
-            given = np.asarray(actions)[:, None]
-        observed, rewards, terminations, truncations, ends = self.batch.step(given)
-        infos: dict[str, Any] = {}
-        if ends:
-            final = _of_one(ends["final_obs"])
-            for k in np.flatnonzero(ends["_final_obs"]):
-                last = {name: array[k] for name, array in final.items()}
-                infos = self._add_info(infos, {"final_obs": last, "final_info": {}}, int(k))
-        return _of_one(observed), rewards[:, 0], terminations, truncations, infos
+            given = self._by_worlds(actions)
+        observed, rewards, terminations, truncations, infos = self.batch.step(given)
+        return (
+            _in_rows(observed),
+            rewards.reshape(-1),
+            self._repeat(terminations),
+            self._repeat(truncations),
+            self._infos_of_rows(infos),
+        )
+
+    def render(self) -> tuple[NDArray[np.uint8], ...]:
+        """Returns an image of each world."""
+        return tuple(self.batch.render(world) for world in range(self.batch.num_worlds))
+
+    def close_extras(self, **_: Any) -> None:
+        """Does nothing: worlds have no open files."""
+
+    def _by_worlds(self, values: Any) -> NDArray[Any]:
+        array = np.asarray(values)
+        return array.reshape(self.batch.num_worlds, -1, *array.shape[1:])
+
+    def _repeat(self, by_world: NDArray[Any]) -> NDArray[Any]:
+        return np.repeat(by_world, len(self.batch.agents), axis=0)
+
+    def _infos_of_rows(self, infos: dict[str, Any]) -> dict[str, Any]:
+        """Returns infos as Gymnasium has them: a row for each environment, and for dicts a list with dicts or None."""
+        result: dict[str, Any] = {}
+        for name, value in infos.items():
+            if name == "final_obs":
+                rows = _in_rows(value)
+                ended = self._repeat(infos["_final_obs"])
+                last = np.full(self.num_envs, None, dtype=object)
+                for k in np.flatnonzero(ended):
+                    last[k] = {key: array[k] for key, array in rows.items()} if isinstance(rows, dict) else rows[k]
+                result[name] = last
+            elif isinstance(value, list):
+                result[name] = np.repeat(np.array(value, dtype=object), len(self.batch.agents))
+            elif np.ndim(value) == 1:
+                result[name] = self._repeat(value)
+            else:
+                result[name] = _in_rows(value)
+        if "final_obs" in result and "final_info" not in result:
+            result["final_info"] = {}
+            result["_final_info"] = result["_final_obs"]
+        return result
 
 
-def _of_one(observed: Observations) -> Observations:
-    return {name: array[:, 0] for name, array in observed.items()}
+def worlds_of(num_envs: int, agents: int) -> int:
+    """Returns the number of worlds in which there are as many agents as environments are asked for."""
+    num_envs = checked_int("num_envs", num_envs, 1, MAX_CYCLES)
+    if num_envs % agents:
+        cause = f"{num_envs} is no multiple of the {agents} agents of a world"
+        raise input_error("num_envs", cause, f"give {agents * -(-num_envs // agents)}, for example")
+    return num_envs // agents
+
+
+def _in_rows(observed: Any) -> Any:
+    """Returns arrays with a row for each agent of each world."""
+    if isinstance(observed, dict):
+        return {name: _in_rows(array) for name, array in observed.items()}
+    return observed.reshape(-1, *observed.shape[2:])

@@ -62,8 +62,8 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         width: width of images in pixels.
         workers: number of workers of the simulation.
 
-    An episode's seed is drawn from the environment's own generator, which ``reset`` seeds, so that a sequence of
-    episodes is reproducible from its first seed.
+    The episode after ``reset(seed=s)`` has the seed ``s``, and those after it draw theirs from a generator with that seed,
+    so that a sequence of episodes is reproducible from its first seed.
     """
 
     #: The world of its scenarios; None for any world.
@@ -141,16 +141,19 @@ class ParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Starts an episode, and returns the observations of all agents; ``options`` are ignored."""
-        if seed is not None:
-            self._rng = np.random.default_rng(seed)
-        # Drawn from the generator even with a seed, so that the next episode differs from this one.
-        episode_seed = int(self._rng.integers(MAX_SEED))
+        """Starts an episode, and returns the observations of all agents, and its seed in their infos; ``options`` are
+        ignored.
+        """
+        if seed is None:
+            episode_seed = int(self._rng.integers(MAX_SEED))
+        else:
+            episode_seed = checked_int("seed", seed, 0, MAX_SEED - 1)
+            self._rng = np.random.default_rng(episode_seed)
         self.sim.close()
         self.sim = Simulation(self.scenario, seed=episode_seed, workers=self._workers)
         self.agents = list(self.possible_agents)
         self._before = self._observed()
-        return self._split(self._before), {agent: {} for agent in self.agents}
+        return self._split(self._before), {agent: {"seed": episode_seed} for agent in self.agents}
 
     def step(
         self, actions: Mapping[str, Any]

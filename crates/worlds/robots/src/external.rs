@@ -140,9 +140,17 @@ impl RobotsWorld {
         let boxes = ValueDomain::Integer { low: -1, high: i64::from(longest_side) - 1 };
         let cycles = ValueDomain::Integer { low: 0, high: i64::from(u32::MAX) };
         let goal = "column and row where it has to go next; -1 for one with no goal";
+        let steps = ValueDomain::Integer { low: -1, high: i64::from(u32::MAX) };
+        let to_goal =
+            "boxes of the shortest path to its goal past walls; -1 where none leads there";
+        let by_one = ValueDomain::Integer { low: -1, high: 1 };
+        let nearer = "steps by which the box ahead, to the left, behind and to the right is nearer to its goal; 0 where it \
+                      does not fit";
         let busy = "cycles of delay, and of an action that goes on, before it can act";
         let mut spaces = vec![
             ValueSpace::new("goal_boxes", boxes, goal).with_shape([2]),
+            ValueSpace::new("goal_steps", steps, to_goal),
+            ValueSpace::new("goal_nearer", by_one, nearer).with_shape([4]),
             ValueSpace::new("busy_cycles", cycles, busy),
         ];
         if let TeamOrders::Plans { actions } = orders {
@@ -257,7 +265,7 @@ impl RobotsWorld {
         let count = self.planner_observation_spaces(orders).len();
         let Some(split) = others.len().checked_sub(count) else { return };
         let (percepts, of_planner) = others.split_at_mut(split);
-        let [goals, busy, plan_left @ ..] = of_planner else { return };
+        let [goals, goal_steps, goal_nearer, busy, plan_left @ ..] = of_planner else { return };
         let teams = self.planner_teams.iter().zip(&state.planner_teams);
         // Robots of one section are all in one team, but a team may have several sections.
         let shown = teams.filter(|(team, _)| agents.binary_search(&team.robots.start).is_ok());
@@ -275,6 +283,11 @@ impl RobotsWorld {
                     row,
                     goal.map_or([-1; 2], |(col, row)| [i64::from(col), i64::from(row)]),
                 );
+                let (steps, nearer) = team.steps_to(known.poses[robot], goal);
+                goal_steps.set_integer(row, steps);
+                for (side, by) in nearer.into_iter().enumerate() {
+                    goal_nearer.set_integer(4 * row + side, by);
+                }
                 busy.set_integer(row, i64::from(busy_cycles[robot]));
                 for left in plan_left.iter_mut() {
                     left.set_integer(row, known.actions_left[robot] as i64);

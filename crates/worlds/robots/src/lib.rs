@@ -34,6 +34,7 @@ mod errands;
 pub mod exact;
 mod external;
 mod facts;
+mod goal_distances;
 mod grid_team;
 mod import;
 mod inspect;

@@ -6,6 +6,7 @@
 
 use super::belief::Knowledge;
 use super::effector::{FORWARD, LEFT, RIGHT, STAY};
+use super::goal_distances::GoalDistances;
 use super::perceive::memory_of;
 use super::state::BodyRecord;
 use super::state::RobotsState;
@@ -18,6 +19,7 @@ use sidestep_kernel::{Cycle, EntityId, Seed};
 use sidestep_map::planning::FreeSpace;
 use sidestep_planners::{Action, BusyAgent, GridPose, PlanCounts, TeamStep};
 use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
 
 impl RobotsWorld {
     /// Returns the state of each team before the first cycle.
@@ -32,6 +34,19 @@ impl RobotsWorld {
             states.push(team_state.with_tasks(&free, &sizes, team.tasks.as_deref()));
         }
         states.into()
+    }
+
+    /// Prepares the steps to goals of the teams that a caller orders, who observes them.
+    pub(crate) fn remember_goal_distances(&mut self) {
+        for number in 0..self.planner_teams.len() {
+            let team = &self.planner_teams[number];
+            if team.leader.orders.is_none() {
+                continue;
+            }
+            let size = self.type_of(team.robots.start).size.0;
+            let distances = GoalDistances::new(FreeSpace::from_map(&self.map), size);
+            self.planner_teams[number].goal_distances = Some(Arc::new(Mutex::new(distances)));
+        }
     }
 
     /// Plans for each team whose robots are due, after bodies have given up what they left, and delays have

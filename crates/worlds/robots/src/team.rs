@@ -3,6 +3,7 @@
 use crate::belief::{Beliefs, Reports};
 use crate::effector::ActionId;
 use crate::errand_fields::ErrandFields;
+use crate::goal_distances::GoalDistances;
 use crate::team_memory::TeamMemory;
 use crate::team_words;
 use sidestep_kernel::{EntityId, Seed};
@@ -25,6 +26,17 @@ pub(crate) struct Team {
     pub(crate) leader: TeamLeader,
     /// What they carry out; none for robots with goals of their own.
     pub(crate) tasks: Option<Arc<TeamTasks>>,
+    /// The steps to their goals, where a caller orders them and so observes the steps. No result depends on which are kept,
+    /// so all runs of a scenario share them.
+    pub(crate) goal_distances: Option<Arc<Mutex<GoalDistances>>>,
+}
+
+impl Team {
+    /// Returns the steps from a pose to a goal and by how much each neighbor is nearer; see [`GoalDistances::steps`].
+    pub(crate) fn steps_to(&self, pose: GridPose, goal: Option<(u32, u32)>) -> (i64, [i64; 4]) {
+        let distances = self.goal_distances.as_ref().zip(goal);
+        distances.map_or((-1, [0; 4]), |(distances, goal)| lock(distances).steps(pose, goal))
+    }
 }
 
 /// Who leads a team.

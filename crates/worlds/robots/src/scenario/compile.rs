@@ -264,6 +264,7 @@ impl<'a> Compiler<'a> {
         };
         // Teams are found in the finished world, of whose types and robots they are made.
         world.teams = Arc::new(world.find_teams());
+        world.remember_goal_distances();
         let mut remarks = self.remarks;
         remarks.extend(crate::contact_remarks::no_contact_remarks(&world));
         Ok(Compiled {

@@ -43,7 +43,8 @@ impl Placer {
                 Some((_, team)) => team.robots.end = end,
                 None => {
                     let leader = of_group.leader.clone();
-                    let team = Team { robots: first..end, leader, tasks: group.tasks.clone() };
+                    let tasks = group.tasks.clone();
+                    let team = Team { robots: first..end, leader, tasks, goal_distances: None };
                     teams.push((of_group.number, team));
                 }
             }

@@ -1,0 +1,321 @@
+"""Scores of policies and scripted methods on the same seeds, and leaderboards."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import stats
+from ..._errors import InputError, checked_int, input_error
+from ..._native import Batch as Worlds
+from ..._native import Simulation, __version__
+from ._task import TIME_LEFT, Task, acting_team
+from ._worlds import TaskBatch
+
+Policy = Callable[[NDArray[np.float32], "NDArray[np.int8] | None"], NDArray[Any]]
+"""From observations (agents, numbers) and masks of choices (agents, choices), None where actions are no choices, to actions, a
+row for each. A method ``reset``, if there is one, is called before each batch of episodes."""
+
+#: The first seed of judgments: none that learners use by default.
+FIRST_SEED = 1_000_000
+#: Worlds that are judged at once.
+MAX_WORLDS = 50
+#: The file of a leaderboard.
+FILE = "leaderboard.json"
+
+
+@dataclass(frozen=True)
+class Judgment:
+    """Scores of a policy, or of a scripted method, on some seeds."""
+
+    #: The task, such as ``Superconflict-v0``.
+    task: str
+    #: Its name.
+    name: str
+    is_higher_better: bool
+    seeds: NDArray[np.int64]
+    #: The score of each seed.
+    scores: NDArray[np.float64]
+    #: Digest of the last state of each seed, in hexadecimal.
+    digests: list[str]
+
+    @property
+    def mean(self) -> stats.Mean:
+        """The mean with its intervals."""
+        return stats.mean(self.scores)
+
+    def compare(self, other: Judgment) -> stats.Paired:
+        """Returns how much higher the scores are than those of another one, seed by seed."""
+        if self.task != other.task or not np.array_equal(self.seeds, other.seeds):
+            raise input_error("other", "it is of another task or of other seeds", "judge both on the same ones")
+        return stats.paired(self.scores, other.scores)
+
+    def beats(self, other: Judgment) -> bool:
+        """Returns whether it is better: whether the 95 % interval of the difference leaves no doubt."""
+        interval = self.compare(other).interval
+        if interval is None:
+            return False
+        low, high = interval
+        return low > 0.0 if self.is_higher_better else high < 0.0
+
+
+def judge(
+    task: Task, policy: Policy, *, name: str = "policy", runs: int = 100, seed: int = FIRST_SEED, workers: int = 1
+) -> Judgment:
+    """Returns the scores of a policy, of an episode with each of ``runs`` seeds from ``seed`` on."""
+    runs = checked_int("runs", runs, 1, 1_000_000)
+    scores, digests = np.zeros(runs), [""] * runs
+    for first in range(0, runs, MAX_WORLDS):
+        count = min(MAX_WORLDS, runs - first)
+        batch = TaskBatch(task, count, workers=workers)
+        ended = np.zeros(count, bool)
+        for infos in _episodes(batch, policy, seed + first):
+            fresh = infos.get("_score", ended) & ~ended
+            if fresh.any():
+                found = batch.worlds.digests
+                for world in np.flatnonzero(fresh):
+                    scores[first + world] = infos["score"][world]
+                    digests[first + world] = found[world]
+                ended |= fresh
+            if ended.all():
+                break
+    return Judgment(task.id, name, task.score.is_higher_better, seed + np.arange(runs), scores, digests)
+
+
+def _episodes(batch: TaskBatch, policy: Policy, seed: int) -> Any:
+    """Lets a policy act, and yields the infos of each cycle; worlds that have ended go on with further episodes."""
+    reset = getattr(policy, "reset", None)
+    if reset is not None:
+        reset()
+    observed, infos = batch.reset(seed=seed)
+    shape = observed.shape[:2]
+    has_mask = batch.design.actions.mask is not None
+    while True:
+        rows = observed.reshape(-1, observed.shape[2])
+        masks = infos["action_mask"].reshape(len(rows), -1) if has_mask else None
+        actions = np.asarray(policy(rows, masks))
+        if len(actions) != len(rows):
+            cause = f"the policy returned {len(actions)} actions for {len(rows)} agents"
+            raise input_error("policy", cause, "return an array with a row for each observation")
+        observed, _, _, _, infos = batch.step(actions.reshape(*shape, *actions.shape[1:]))
+        yield infos
+
+
+def judge_method(task: Task, method: str, *, runs: int = 100, seed: int = FIRST_SEED, workers: int = 1) -> Judgment:
+    """Returns the scores of a scripted method, on the seeds on which :func:`judge` judges a policy."""
+    runs = checked_int("runs", runs, 1, 1_000_000)
+    scores, digests = np.zeros(runs), [""] * runs
+    for first in range(0, runs, MAX_WORLDS):
+        seeds = seed + first + np.arange(min(MAX_WORLDS, runs - first))
+        found = _run_method(task, method, seeds, workers)
+        for k, (score, digest) in enumerate(found):
+            scores[first + k], digests[first + k] = score, digest
+    return Judgment(task.id, method, task.score.is_higher_better, seed + np.arange(runs), scores, digests)
+
+
+def _run_method(task: Task, method: str, seeds: NDArray[np.int64], workers: int) -> list[tuple[float, str]]:
+    """Runs a scripted method until the end of each episode, which is that of a policy's episode."""
+    scenario = task.scenario(method)
+    worlds = Worlds(scenario, len(seeds), workers=workers, seeds=seeds)
+    design = task.design(task.setting())
+    if design.tracker is None:
+        worlds.step(scenario.cycles)
+        return [
+            (task.score.measure(metrics, {}), digest)
+            for metrics, digest in zip(worlds.metrics(), worlds.digests, strict=True)
+        ]
+    team = acting_team(worlds.teams)
+    agents = len(team)
+    tracker = design.tracker(len(seeds) * agents)
+    going = np.ones(len(seeds), bool)
+
+    def arrays() -> dict[str, NDArray[Any]]:
+        seen = worlds.observe(team.name)
+        return {name: array.reshape(-1, *array.shape[2:]) for name, array in seen.items()}
+
+    tracker.restart(np.repeat(going, agents), arrays())
+    for _ in range(scenario.cycles):
+        worlds.step(mask=going)
+        now = arrays()
+        tracker.advance(np.repeat(going, agents), now)
+        left = np.repeat(1.0 - worlds.cycles / scenario.cycles, agents)
+        now |= {**tracker.arrays, TIME_LEFT: left}
+        done = np.zeros(len(seeds), bool)
+        if design.is_done is not None:
+            done = design.is_done(now).reshape(len(seeds), agents).all(axis=1)
+        going &= ~done & ~worlds.is_over
+        if not going.any():
+            break
+    results = []
+    for k, (metrics, digest) in enumerate(zip(worlds.metrics(), worlds.digests, strict=True)):
+        tracked = {name: array[k * agents : (k + 1) * agents] for name, array in tracker.arrays.items()}
+        results.append((task.score.measure(metrics, tracked), digest))
+    return results
+
+
+@dataclass(frozen=True)
+class Leaderboard:
+    """A folder with judgments, policies and recorded runs of a task."""
+
+    folder: Path
+    task: str
+    version: str
+    #: By name.
+    judgments: dict[str, Judgment]
+
+    @classmethod
+    def read(cls, folder: str | PathLike[str]) -> Leaderboard:
+        """Reads a folder that :func:`write_leaderboard` wrote.
+
+        Raises InputError when it is none.
+        """
+        folder = Path(folder)
+        try:
+            content = json.loads((folder / FILE).read_text(encoding="utf-8"))
+            entries = content["entries"]
+            judgments = {
+                name: Judgment(
+                    content["task"],
+                    name,
+                    content["is_higher_better"],
+                    np.array(entry["seeds"], np.int64),
+                    np.array(entry["scores"], float),
+                    list(entry["digests"]),
+                )
+                for name, entry in entries.items()
+            }
+            return cls(folder, content["task"], content["sidestep"], judgments)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            remedy = f"give a folder that write_leaderboard wrote: it has a {FILE}"
+            raise input_error("folder", f"{folder} is no leaderboard: {error}", remedy) from error
+
+    @property
+    def ranking(self) -> list[str]:
+        """The names, the best mean score first."""
+        sign = -1.0 if next(iter(self.judgments.values())).is_higher_better else 1.0
+        return sorted(self.judgments, key=lambda name: sign * float(self.judgments[name].scores.mean()))
+
+    @property
+    def runs(self) -> list[Path]:
+        """The folders of recorded runs: ``sidestep replay`` repeats each, and compares its digest."""
+        return sorted(path.parent for path in self.folder.glob("runs/*/*/manifest.json"))
+
+    def __str__(self) -> str:
+        lines = [f"{self.task}, sidestep {self.version}"]
+        for place, name in enumerate(self.ranking, 1):
+            mean = self.judgments[name].mean
+            interval = "" if mean.interval is None else f" [{mean.interval[0]:.2f}, {mean.interval[1]:.2f}]"
+            lines.append(f"{place:2} {name:<24} {mean.mean:10.2f}{interval}, {mean.n} seeds")
+        return "\n".join(lines)
+
+
+def write_leaderboard(
+    folder: str | PathLike[str],
+    task: Task,
+    entries: Mapping[str, Policy | str],
+    *,
+    runs: int = 100,
+    seed: int = FIRST_SEED,
+    recorded: int = 3,
+    files: Sequence[str | PathLike[str]] = (),
+    workers: int = 1,
+) -> Leaderboard:
+    """Judges policies and scripted methods, and writes the scores, with a record of the first ``recorded`` runs of each.
+
+    ``entries`` are policies, or names of scripted methods, by the names under which they are listed; ``files``, such as
+    weights and the program that reads them, are copied into the folder. ``sidestep replay FOLDER/runs/NAME/SEED`` repeats a
+    recorded run without the policy, and tells whether the digest is the same.
+
+    Raises InputError when the folder exists already.
+    """
+    folder = Path(folder)
+    if folder.exists():
+        raise input_error("folder", f"{folder} exists already", "give another name, or delete it")
+    judgments = {}
+    for name, entry in entries.items():
+        if isinstance(entry, str):
+            judgments[name] = judge_method(task, entry, runs=runs, seed=seed, workers=workers)
+        else:
+            judgments[name] = judge(task, entry, name=name, runs=runs, seed=seed, workers=workers)
+    for name, entry in entries.items():
+        for k in range(min(recorded, runs)):
+            _record(folder / "runs" / name / str(seed + k), task, entry, seed + k, judgments[name].digests[k])
+    (folder / "files").mkdir(parents=True)
+    for file in files:
+        shutil.copy(file, folder / "files")
+    content = {
+        "task": task.id,
+        "sidestep": __version__,
+        "score": task.score.name,
+        "meaning": task.score.meaning,
+        "is_higher_better": task.score.is_higher_better,
+        "files": sorted(path.name for path in (folder / "files").iterdir()),
+        "entries": {
+            name: {"seeds": found.seeds.tolist(), "scores": found.scores.tolist(), "digests": found.digests}
+            for name, found in judgments.items()
+        },
+    }
+    (folder / FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    return Leaderboard.read(folder)
+
+
+def _record(folder: Path, task: Task, entry: Policy | str, seed: int, digest: str) -> None:
+    """Records one run, the same as was judged."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(entry, str):
+        scenario = task.scenario(entry)
+        sim = Simulation(scenario, seed=seed, out=folder)
+        cycles = _judged_cycles(task, entry, seed)
+        sim.step(cycles)
+    else:
+        batch = TaskBatch(task, 1)
+        sim = Simulation(batch.scenario, seed=seed, out=folder)
+        for infos in _episodes(batch, entry, seed):
+            for order, values in batch.last_orders.items():
+                sim.order(order, values[0], team=batch.team_number)
+            sim.step()
+            if "_score" in infos and infos["_score"][0]:
+                break
+    found = sim.digest
+    sim.close()
+    if found != digest:
+        # Policies whose arithmetic depends on how many observations come at once do that.
+        cause = f"the run of seed {seed} alone ended with another digest than among others"
+        raise InputError(
+            f"entries: {cause}\n  help: let the policy decide for each row by itself",
+            "entries",
+            None,
+            None,
+            None,
+            cause,
+            "",
+        )
+
+
+def _judged_cycles(task: Task, method: str, seed: int) -> int:
+    """Returns after how many cycles the episode of a scripted method ends."""
+    design = task.design(task.setting())
+    scenario = task.scenario(method)
+    if design.tracker is None:
+        return scenario.cycles
+    sim = Simulation(scenario, seed=seed)
+    team = acting_team(sim.teams)
+    everyone = np.ones(len(team), bool)
+    tracker = design.tracker(len(team))
+    tracker.restart(everyone, sim.observe(team.name))
+    while sim.cycle < scenario.cycles and not sim.is_over:
+        sim.step()
+        seen = sim.observe(team.name)
+        tracker.advance(everyone, seen)
+        now = {**seen, **tracker.arrays, TIME_LEFT: np.zeros(len(team))}
+        if design.is_done is not None and design.is_done(now).all():
+            break
+    return sim.cycle
