@@ -11,6 +11,7 @@ a table, and, where Matplotlib is installed, as a picture.
 from __future__ import annotations
 
 import argparse
+import copy
 import csv
 import time
 from pathlib import Path
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from torch import nn
 from torch.distributions import Categorical, Normal
 
+import sidestep
 from sidestep.envs import tasks
 
 Tensor = torch.Tensor
@@ -103,15 +105,17 @@ def as_actions(space: spaces.Space[Any], drawn: Tensor) -> NDArray[Any]:
 
 
 def policy_of(agent: Agent, space: spaces.Space[Any], draws: bool = False) -> Any:
-    """Returns the policy for :func:`sidestep.envs.tasks.judge`."""
+    """Returns the policy for :func:`sidestep.compare`."""
+    # The last bits of a sum depend on how many rows are computed at once. In double precision, rounded at the end, actions
+    # do not, so that a recorded run is the one that was judged.
+    exact = copy.deepcopy(agent).double()
 
     def policy(observed: NDArray[np.float32], masks: NDArray[np.int8] | None) -> NDArray[Any]:
         with torch.no_grad():
-            # Each row by itself would be slow; in double precision the sums do not depend on how many rows there are.
-            seen = torch.from_numpy(observed)
+            seen = torch.from_numpy(observed).double()
             allowed = None if masks is None else torch.from_numpy(masks)
-            found = agent.act(seen, allowed)[0] if draws else agent.best(seen, allowed)
-        return as_actions(space, found)
+            found = exact.act(seen, allowed)[0] if draws else exact.best(seen, allowed)
+        return as_actions(space, found.float() if found.is_floating_point() else found)
 
     return policy
 
@@ -242,28 +246,6 @@ def write_curve(folder: Path, task: tasks.Task, curve: list[tuple[int, float, fl
     figure.savefig(folder / "curve.png", dpi=150)
 
 
-def report(task: tasks.Task, learned: tasks.Judgment, runs: int) -> None:
-    """Prints the scores of the policy and of each scripted method, on the same seeds."""
-    better = "higher" if task.score.is_higher_better else "lower"
-    print(f"\n{task.id}: {task.score.meaning}; {better} is better; {runs} seeds, 95 % intervals")
-    rows = [learned, *(tasks.judge_method(task, method, runs=runs) for method in task.methods)]
-    for one in rows:
-        low, high = one.mean.interval or (one.mean.mean, one.mean.mean)
-        line = f"{one.name:<20} {one.mean.mean:9.3f} [{low:.3f}, {high:.3f}]"
-        if one is not learned:
-            pairs = learned.compare(one)
-            low, high = pairs.interval or (pairs.difference, pairs.difference)
-            verdict = (
-                "beats it"
-                if learned.beats(one)
-                else "loses to it"
-                if one.beats(learned)
-                else "is as good, as far as seen"
-            )
-            line += f"   the policy {verdict}: {pairs.difference:+.3f} [{low:+.3f}, {high:+.3f}]"
-        print(line)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--task", default="Exploration-v0", choices=list(tasks.TASKS), help="the task [Exploration-v0]")
@@ -281,31 +263,39 @@ def main() -> None:
         "--entropy", type=float, default=0.01, help="weight of entropy at the start; it falls to 0 [0.01]"
     )
     parser.add_argument("--seed", type=int, default=1, help="seed of the first world, and of PyTorch [1]")
-    parser.add_argument("--workers", type=int, default=2, help="workers of the worlds, and threads of PyTorch [2]")
+    parser.add_argument("--workers", type=int, default=2, help="workers of the worlds [2]")
     parser.add_argument("--runs", type=int, default=100, help="fresh seeds to judge with [100]")
     parser.add_argument("--draws", action="store_true", help="judge the policy that draws, not that of best actions")
     parser.add_argument("--out", default="trained", help="folder for weights and curve [trained]")
+    parser.add_argument(
+        "--weights", default=None, help="weights of an earlier call, which are judged without training [none]"
+    )
     parser.add_argument("--leaderboard", default=None, help="folder for a leaderboard with recorded runs [none]")
     args = parser.parse_args()
     torch.manual_seed(args.seed)
-    torch.set_num_threads(args.workers)
+    # The networks are small: a second thread would cost more than it brings.
+    torch.set_num_threads(1)
     task = tasks.find_task(args.task)
     trainer = Trainer(task, args)
-    trainer.train()
     folder = Path(args.out)
-    folder.mkdir(parents=True, exist_ok=True)
-    torch.save(trainer.agent.state_dict(), folder / "policy.pt")
-    write_curve(folder, task, trainer.curve)
+    if args.weights:
+        trainer.agent.load_state_dict(torch.load(args.weights, weights_only=True))
+    else:
+        trainer.train()
+        folder.mkdir(parents=True, exist_ok=True)
+        torch.save(trainer.agent.state_dict(), folder / "policy.pt")
+        write_curve(folder, task, trainer.curve)
     policy = policy_of(trainer.agent, trainer.space, args.draws)
-    report(task, tasks.judge(task, policy, name="ppo", runs=args.runs, workers=args.workers), args.runs)
+    # On the same seeds, none of which the policy has met: seed by seed against each scripted method.
+    entries = {"ppo": policy, **{method: method for method in task.methods}}
+    print(f"\n{sidestep.compare(task, methods=entries, runs=args.runs, workers=args.workers)}")
     if args.leaderboard:
-        entries = {"ppo": policy, **{method: method for method in task.methods}}
         board = tasks.write_leaderboard(
             args.leaderboard,
             task,
             entries,
             runs=args.runs,
-            files=[folder / "policy.pt", __file__],
+            files=[args.weights or folder / "policy.pt", __file__],
             workers=args.workers,
         )
         print(f"\n{board}")

@@ -46,6 +46,7 @@ from ._native import (
 from ._read import Tables, read
 from ._status import SweepStatus, sweep_status
 from ._sweep import Comparison, Sweep, compare, sweep
+from .datasets import to_minari
 
 __all__ = [
     "Agent",
@@ -88,6 +89,7 @@ __all__ = [
     "stats",
     "sweep",
     "sweep_status",
+    "to_minari",
     "trajectories",
     "worlds",
 ]

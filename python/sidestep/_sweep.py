@@ -5,13 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _engines, _notebook
 from ._engines import Engine
 from ._errors import checked_int, input_error
 from ._native import Scenario, Table, compare_methods, run_sweep
+from ._progress import Progress
 
+if TYPE_CHECKING:
+    from .envs.tasks import Task, TaskComparison
+
+#: Methods of collision avoidance that are compared by default.
+METHODS = ["pc", "orca", "mvp", "bands", "none"]
 #: Maximum number of runs of a variant.
 MAX_RUNS = 1_000_000
 
@@ -101,6 +107,7 @@ def sweep(
     workers: int | None = None,
     out: str | os.PathLike[str] | None = None,
     engine: Engine = "local",
+    progress: Progress | None = None,
 ) -> Sweep:
     """Runs many variants of a scenario, each with many seeds, as ``sidestep sweep`` does, with the same bits.
 
@@ -118,6 +125,9 @@ def sweep(
     ``ProcessPoolExecutor()``, Dask's ``client.get_executor()`` or one of mpi4py, or a function that creates one, which is
     called again when workers are killed. ``workers`` is then the number of tasks at once. The table is the same for
     every engine.
+
+    ``progress`` is a function that is told now and then how many runs are done, and how many there are (those that are certain,
+    with ``until``), or True for a bar of tqdm.
 
     Raises InputError when an argument is wrong, before any run starts; RecordError when the folder cannot be written;
     EngineError when an executor keeps failing.
@@ -161,25 +171,31 @@ def sweep(
         raise input_error("record", "there is no folder to record runs to", "give one as `out`")
     pool = _engines.task_pool(engine, workers)
     if pool is None:
-        return run_sweep(sweep, options, out, workers or 0, None)
+        return run_sweep(sweep, options, out, workers or 0, None, progress)
     try:
-        return run_sweep(sweep, options, out, pool.at_once, pool.run)
+        return run_sweep(sweep, options, out, pool.at_once, pool.run, progress)
     finally:
         pool.close()
 
 
 def compare(
-    scenario: str | os.PathLike[str] | Mapping[str, Any] | Scenario,
+    scenario: str | os.PathLike[str] | Mapping[str, Any] | Scenario | Task,
     *,
-    methods: Sequence[str] = ("pc", "orca", "mvp", "bands", "none"),
-    runs: int = 10,
+    methods: Sequence[str] | Mapping[str, Any] | None = None,
+    runs: int | None = None,
     seed: int | None = None,
     workers: int | None = None,
-) -> Comparison:
-    """Compares methods of collision avoidance on the same air traffic, as ``sidestep compare --json`` does.
+) -> Comparison | TaskComparison:
+    """Compares methods of collision avoidance on the same air traffic, as ``sidestep compare --json`` does; or policies and
+    scripted methods on a task of :mod:`sidestep.envs.tasks`.
+
+    Of a task, or its name such as ``"sidestep/Superconflict-v0"``, ``methods`` are policies, or names of scripted methods, by the
+    names under which they are listed; ``runs`` is 100 by default. See :func:`sidestep.envs.tasks.compare_on_task`.
+
+    Of air traffic, which is any other scenario of airplanes:
 
     ``methods`` are among ``"pc"`` (probability collectives), ``"orca"``, ``"mvp"``, ``"bands"`` (of detect and
-    avoid) and ``"none"``. Each flies ``runs`` times, with consecutive seeds from ``seed`` on (the scenario's). The result has a dict of each method under ``"methods"``:
+    avoid) and ``"none"``, all of them by default. Each flies ``runs`` times (10), with consecutive seeds from ``seed`` on (the scenario's). The result has a dict of each method under ``"methods"``:
     ``losses`` of separation, ``arrived`` (a proportion), ``delay_percent``, ``intrusion_prevention_rate``, ``domino_effect``
     (conflicts beside those of the same traffic without resolution) and others, each with its ``mean``, its 95 %
     ``interval`` and ``n``; ``min_separation_m`` is the minimum over all runs.
@@ -194,9 +210,28 @@ def compare(
     >>> [(method["method"], method["loss_free"]) for method in comparison["methods"]]
     [('pc', 3), ('none', 0)]
     """
-    count = _count("runs", runs, MAX_RUNS) or 1
+    count = _count("runs", runs, MAX_RUNS)
     workers = _count("workers", workers, 1024) or 0
-    return Comparison(compare_methods(scenario, _names("methods", methods), count, _seed(seed), workers))
+    if isinstance(methods, str):
+        _names("methods", methods)
+    if _is_task(scenario):
+        from .envs import tasks
+
+        task = tasks.find_task(scenario)  # type: ignore[arg-type]
+        return tasks.compare_on_task(task, methods, runs=count or 100, seed=_seed(seed), workers=workers or 1)
+    if isinstance(methods, Mapping):
+        remedy = "give a list of names; policies are compared on tasks, such as sidestep/Superconflict-v0"
+        raise input_error("methods", "they are a dict, and the scenario is no task", remedy)
+    names = METHODS if methods is None else _names("methods", methods)
+    chosen: Any = scenario
+    return Comparison(compare_methods(chosen, names, count or 10, _seed(seed), workers))
+
+
+def _is_task(scenario: object) -> bool:
+    """Returns whether it is a task, or the name of one; nothing is imported for what is none."""
+    if isinstance(scenario, str):
+        return scenario.startswith("sidestep/") and not os.path.exists(scenario)
+    return type(scenario).__module__.startswith("sidestep.envs.tasks")
 
 
 def _mapping(name: str, values: Mapping[str, Any] | None) -> Mapping[str, Any]:

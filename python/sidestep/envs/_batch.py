@@ -80,7 +80,7 @@ class Batch:
         self._orders = orders_of(acting, world, orders)
         self._reward = rewards_of(acting, world, rewards)
         self.agents = [f"{noun}_{agent}" for agent in acting.agents]
-        self.single_observation_space = spaces.Dict(
+        self.single_observation_space: spaces.Space[Any] = spaces.Dict(
             {space.name: space_of(space) for space in acting.observation_spaces}
         )
         self.single_action_space = action_space(self._orders)

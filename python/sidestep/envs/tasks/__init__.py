@@ -32,7 +32,15 @@ from ..._errors import input_error
 from . import airspace as _airspace
 from . import chain as _chain
 from . import robots as _robots
-from ._judge import Judgment, Leaderboard, judge, judge_method, write_leaderboard
+from ._judge import (
+    Judgment,
+    Leaderboard,
+    TaskComparison,
+    compare_on_task,
+    judge,
+    judge_method,
+    write_leaderboard,
+)
 from ._learners import sb3_env as _sb3_env
 from ._learners import torchrl_env as _torchrl_env
 from ._parallel import TaskParallelEnv, snake_case
@@ -53,11 +61,13 @@ __all__ = [
     "Setting",
     "Task",
     "TaskBatch",
+    "TaskComparison",
     "TaskEnv",
     "TaskParallelEnv",
     "TaskVectorEnv",
     "aec_env",
     "batch_env",
+    "compare_on_task",
     "find_task",
     "judge",
     "judge_method",

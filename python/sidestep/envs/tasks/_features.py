@@ -54,7 +54,7 @@ def vector(name: str, meaning: str, values: Callable[[Arrays], NDArray[Any]], fu
     def shorten(arrays: Arrays) -> NDArray[Any]:
         vectors = values(arrays) / full_m
         length = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
-        return vectors / np.maximum(length, 1.0)
+        return np.asarray(vectors / np.maximum(length, 1.0))
 
     parts = tuple(f"{meaning}, {axis}, in units of {full_m:g} m; at most 1 long" for axis in axes.split())
     return Feature(name, parts, shorten)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -95,6 +96,7 @@ def _episodes(batch: TaskBatch, policy: Policy, seed: int) -> Any:
     reset = getattr(policy, "reset", None)
     if reset is not None:
         reset()
+    observed: Any
     observed, infos = batch.reset(seed=seed)
     shape = observed.shape[:2]
     has_mask = batch.design.actions.mask is not None
@@ -135,7 +137,7 @@ def _run_method(task: Task, method: str, seeds: NDArray[np.int64], workers: int)
     team = acting_team(worlds.teams)
     agents = len(team)
     tracker = design.tracker(len(seeds) * agents)
-    going = np.ones(len(seeds), bool)
+    going: NDArray[np.bool_] = np.ones(len(seeds), bool)
 
     def arrays() -> dict[str, NDArray[Any]]:
         seen = worlds.observe(team.name)
@@ -148,10 +150,10 @@ def _run_method(task: Task, method: str, seeds: NDArray[np.int64], workers: int)
         tracker.advance(np.repeat(going, agents), now)
         left = np.repeat(1.0 - worlds.cycles / scenario.cycles, agents)
         now |= {**tracker.arrays, TIME_LEFT: left}
-        done = np.zeros(len(seeds), bool)
+        done: NDArray[np.bool_] = np.zeros(len(seeds), bool)
         if design.is_done is not None:
             done = design.is_done(now).reshape(len(seeds), agents).all(axis=1)
-        going &= ~done & ~worlds.is_over
+        going = np.logical_and(going, ~np.logical_or(done, worlds.is_over))
         if not going.any():
             break
     results = []
@@ -159,6 +161,96 @@ def _run_method(task: Task, method: str, seeds: NDArray[np.int64], workers: int)
         tracked = {name: array[k * agents : (k + 1) * agents] for name, array in tracker.arrays.items()}
         results.append((task.score.measure(metrics, tracked), digest))
     return results
+
+
+class TaskComparison(dict[str, Any]):
+    """Scores of policies and scripted methods of a task, as :func:`sidestep.compare` returns them.
+
+    ``methods`` has a dict for each: ``method`` (its name), ``score`` (``mean``, 95 % ``interval`` and ``n``), and for all but
+    the first ``first_less_this``: how much higher the score of the first is, seed by seed (``difference``, ``interval``,
+    ``p_value``), and ``verdict``: what the first one does to it. ``str`` of it is a table.
+    """
+
+    def __str__(self) -> str:
+        better = "higher" if self["is_higher_better"] else "lower"
+        lines = [f"{self['task']}: {self['meaning']}; {better} is better; {self['runs']} seeds, 95 % intervals"]
+        first = self["methods"][0]["method"]
+        for one in self["methods"]:
+            line = f"{one['method']:<20} {_with_interval(one['score']['mean'], one['score']['interval'])}"
+            pairs = one.get("first_less_this")
+            if pairs is not None:
+                told = _with_interval(pairs["difference"], pairs["interval"], sign="+")
+                line += f"   {first} {pairs['verdict']}: {told}"
+            lines.append(line)
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(str(self))}</pre>"
+
+
+def _with_interval(value: float, interval: Any, sign: str = "") -> str:
+    bounds = "" if interval is None else f" [{interval[0]:{sign}.3f}, {interval[1]:{sign}.3f}]"
+    return f"{value:{sign}10.3f}{bounds}"
+
+
+def compare_on_task(
+    task: Task,
+    methods: Mapping[str, Policy | str] | Sequence[str] | None = None,
+    *,
+    runs: int = 100,
+    seed: int | None = None,
+    workers: int = 1,
+) -> TaskComparison:
+    """Compares policies and scripted methods of a task on the same seeds: what :func:`sidestep.compare` does for tasks.
+
+    ``methods`` are policies, or names of scripted methods, by the names under which they are listed; or names alone. By
+    default they are all scripted methods. The others are compared with the first.
+    """
+    if methods is None:
+        methods = list(task.methods)
+    entries = dict(methods) if isinstance(methods, Mapping) else {name: name for name in methods}
+    if not entries:
+        raise input_error("methods", "there are none", f"give policies by name, or some of {', '.join(task.methods)}")
+    seed = FIRST_SEED if seed is None else seed
+    judgments = judge_all(task, entries, runs, seed, workers)
+    first, *_ = judgments.values()
+    told = []
+    for name, found in judgments.items():
+        mean = found.mean
+        one: dict[str, Any] = {"method": name, "score": {"mean": mean.mean, "interval": mean.interval, "n": mean.n}}
+        if found is not first:
+            pairs = first.compare(found)
+            verdict = "beats it" if first.beats(found) else "loses to it" if found.beats(first) else "is alike"
+            one["first_less_this"] = {
+                "difference": pairs.difference,
+                "interval": pairs.interval,
+                "p_value": pairs.p_value,
+                "verdict": verdict,
+            }
+        told.append(one)
+    return TaskComparison(
+        task=task.id,
+        score=task.score.name,
+        meaning=task.score.meaning,
+        is_higher_better=task.score.is_higher_better,
+        first_seed=seed,
+        runs=runs,
+        methods=told,
+    )
+
+
+def judge_all(
+    task: Task, entries: Mapping[str, Policy | str], runs: int, seed: int, workers: int
+) -> dict[str, Judgment]:
+    """Returns the scores of policies, and of scripted methods by their names."""
+    judgments = {}
+    for name, entry in entries.items():
+        if isinstance(entry, str):
+            found = judge_method(task, entry, runs=runs, seed=seed, workers=workers)
+            judgments[name] = replace(found, name=name)
+        else:
+            judgments[name] = judge(task, entry, name=name, runs=runs, seed=seed, workers=workers)
+    return judgments
 
 
 @dataclass(frozen=True)
@@ -206,7 +298,7 @@ class Leaderboard:
     @property
     def runs(self) -> list[Path]:
         """The folders of recorded runs: ``sidestep replay`` repeats each, and compares its digest."""
-        return sorted(path.parent for path in self.folder.glob("runs/*/*/manifest.json"))
+        return sorted(path.parent for path in self.folder.glob("runs/*/*/run.json"))
 
     def __str__(self) -> str:
         lines = [f"{self.task}, sidestep {self.version}"]
@@ -239,12 +331,7 @@ def write_leaderboard(
     folder = Path(folder)
     if folder.exists():
         raise input_error("folder", f"{folder} exists already", "give another name, or delete it")
-    judgments = {}
-    for name, entry in entries.items():
-        if isinstance(entry, str):
-            judgments[name] = judge_method(task, entry, runs=runs, seed=seed, workers=workers)
-        else:
-            judgments[name] = judge(task, entry, name=name, runs=runs, seed=seed, workers=workers)
+    judgments = judge_all(task, entries, runs, seed, workers)
     for name, entry in entries.items():
         for k in range(min(recorded, runs)):
             _record(folder / "runs" / name / str(seed + k), task, entry, seed + k, judgments[name].digests[k])
@@ -270,20 +357,23 @@ def write_leaderboard(
 def _record(folder: Path, task: Task, entry: Policy | str, seed: int, digest: str) -> None:
     """Records one run, the same as was judged."""
     folder.parent.mkdir(parents=True, exist_ok=True)
+    # The plan of the recorded run ends where the episode ends: it is complete then, and can be verified.
     if isinstance(entry, str):
-        scenario = task.scenario(entry)
-        sim = Simulation(scenario, seed=seed, out=folder)
         cycles = _judged_cycles(task, entry, seed)
-        sim.step(cycles)
+        sim = Simulation(task.scenario(entry).set(cycles=cycles), seed=seed, out=folder)
+        sim.run()
     else:
         batch = TaskBatch(task, 1)
-        sim = Simulation(batch.scenario, seed=seed, out=folder)
+        given = []
         for infos in _episodes(batch, entry, seed):
-            for order, values in batch.last_orders.items():
-                sim.order(order, values[0], team=batch.team_number)
-            sim.step()
+            given.append(batch.last_orders)
             if "_score" in infos and infos["_score"][0]:
                 break
+        sim = Simulation(batch.scenario.set(cycles=len(given)), seed=seed, out=folder)
+        for orders in given:
+            for order, values in orders.items():
+                sim.order(order, values[0], team=batch.team_number)
+            sim.step()
     found = sim.digest
     sim.close()
     if found != digest:

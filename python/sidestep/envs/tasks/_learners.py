@@ -61,14 +61,14 @@ def sb3_env(task: Task, num_envs: int, **options: Any) -> Any:
             self.vector.close()
 
         def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-            return [getattr(self.vector, attr_name)] * len(self._get_indices(indices))
+            return [getattr(self.vector, attr_name)] * len(list(self._get_indices(indices)))
 
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
             raise input_error("set_attr", "the worlds share one object", "give options when it is made")
 
         def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
             if method_name == "action_masks":
-                masks = self.vector.batch.action_masks().astype(bool)
+                masks = self.vector.tasks.action_masks().astype(bool)
                 return list(masks.reshape(self.num_envs, -1)[list(self._get_indices(indices))])
             raise input_error("env_method", f"there is no `{method_name}`", 'the only one is "action_masks"')
 
@@ -101,6 +101,7 @@ def torchrl_env(task: Task, worlds: int, *, device: Any = None, **options: Any) 
         def __init__(self) -> None:
             super().__init__(device=device, batch_size=torch.Size([worlds]))
             self.batch = batch
+            self._next_seed: int | None = None
             seen = {"observation": Bounded(-1.0, 1.0, shape=(*shape, size), dtype=torch.float32)}
             if has_mask:
                 seen["action_mask"] = Categorical(2, shape=(*shape, len(batch.design.actions.parts)), dtype=torch.bool)
@@ -137,15 +138,13 @@ def torchrl_env(task: Task, worlds: int, *, device: Any = None, **options: Any) 
             options = None
             if mask is not None:
                 options = {"reset_mask": mask.reshape(worlds).cpu().numpy()}
-            seed = None if self._first_seed is None else self._first_seed
-            self._first_seed = None
-            observed, _ = batch.reset(seed=seed, options=options)
+            observed, _ = batch.reset(seed=self._next_seed, options=options)
+            # Further episodes draw theirs.
+            self._next_seed = None
             falses = torch.zeros((worlds, 1), dtype=torch.bool, device=self.device)
             ends = {name: falses.clone() for name in ("done", "terminated", "truncated")}
             held = TensorDict(self._seen(observed), batch_size=shape, device=self.device)
             return TensorDict({"agents": held, **ends}, batch_size=(worlds,), device=self.device)
-
-        _first_seed: int | None = None
 
         def _step(self, tensordict: Any) -> Any:
             actions = tensordict["agents", "action"].cpu().numpy()
@@ -161,6 +160,6 @@ def torchrl_env(task: Task, worlds: int, *, device: Any = None, **options: Any) 
             return TensorDict({"agents": held, **ends}, batch_size=(worlds,), device=self.device)
 
         def _set_seed(self, seed: int | None) -> None:
-            self._first_seed = seed
+            self._next_seed = seed
 
     return TaskTorchEnv()

@@ -90,6 +90,11 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         observed, rewards, terminations, truncations, infos = self.batch.step(given[None])
         is_over, is_truncated = bool(terminations[0]), bool(truncations[0])
         active = self.batch.is_active()[0].tolist()
+        if not any(active):
+            infos = self._finish(infos)
+            # Others may have come meanwhile.
+            observed = self.batch.observed()
+            active = self.batch.is_active()[0].tolist()
         was_there = set(agents)
         arrived = [agent for agent in self.possible_agents if active[self._numbers[agent]] and agent not in was_there]
         told = agents + arrived
@@ -103,6 +108,12 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
             {agent: is_truncated and not gone[agent] for agent in told},
             self._infos(infos, told),
         )
+
+    def _finish(self, infos: dict[str, Any]) -> dict[str, Any]:
+        """Lets a world without agents go on to its end, such as one in which others still fly, and returns the last infos."""
+        while not infos.get("_score", [False])[0] and not self.batch.is_active().any():
+            *_, infos = self.batch.step(self._idle[None])
+        return infos
 
     def _check(self, actions: Mapping[str, Any], agents: list[str]) -> None:
         missing = [agent for agent in agents if agent not in actions]
@@ -123,7 +134,7 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
 
     def _infos(self, infos: dict[str, Any], agents: list[str]) -> dict[str, dict[str, Any]]:
         masks = list(infos["action_mask"][0]) if "action_mask" in infos else None
-        common = {
+        common: dict[str, Any] = {
             name: infos[name][0].item() if isinstance(infos[name][0], np.generic) else infos[name][0]
             for name in ("seed", "metrics", "score")
             if name in infos and infos[f"_{name}"][0]

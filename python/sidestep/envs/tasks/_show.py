@@ -46,7 +46,8 @@ def _shrunk(image: NDArray[np.uint8], rows: int, columns: int) -> NDArray[np.uin
     across = np.add.reduceat(down, np.arange(columns) * width // columns, axis=1)
     heights = np.diff(np.append(np.arange(rows) * height // rows, height))
     widths = np.diff(np.append(np.arange(columns) * width // columns, width))
-    return (across / (heights[:, None, None] * widths[None, :, None])).astype(np.uint8)
+    means: NDArray[np.uint8] = (across / (heights[:, None, None] * widths[None, :, None])).astype(np.uint8)
+    return means
 
 
 def _show_window(image: NDArray[np.uint8], title: str) -> None:

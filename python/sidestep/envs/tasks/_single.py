@@ -51,7 +51,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             return spaces.Dict({name: self._space_of_all(space) for name, space in one.items()})
         if isinstance(one, spaces.Box):
             shape = (self._agents, *one.shape)
-            return spaces.Box(np.broadcast_to(one.low, shape), np.broadcast_to(one.high, shape), dtype=one.dtype)  # type: ignore[arg-type]
+            return spaces.Box(np.broadcast_to(one.low, shape), np.broadcast_to(one.high, shape), dtype=one.dtype)
         choices = one.nvec if isinstance(one, spaces.MultiDiscrete) else np.array([one.n])  # type: ignore[attr-defined]
         counts = np.tile(choices, (self._agents, 1))
         return spaces.MultiDiscrete(counts[:, 0] if isinstance(one, spaces.Discrete) else counts)
@@ -92,7 +92,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
     def action_masks(self) -> NDArray[np.bool_]:
         """Returns which choices make sense now: by this name learners with masks ask for it."""
         masks = self.batch.action_masks()[0].astype(bool)
-        return masks[0] if self._is_alone else masks
+        return np.asarray(masks[0] if self._is_alone else masks)
 
     def render(self) -> Any:
         """Returns an image (height, width, 3), or text with "ansi"; with "human" it shows the image in a window."""

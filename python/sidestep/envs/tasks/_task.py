@@ -112,7 +112,7 @@ class Task:
     control: Mapping[str, Any]
     design: Callable[[Setting], Design]
     score: Score
-    #: Scripted methods by name: keys of the scenario.
+    #: Scripted methods by name: keys of the scenario; None leaves one out.
     methods: Mapping[str, Mapping[str, Any]]
     #: Whether it has a single agent.
     is_single: bool = False
@@ -135,9 +135,7 @@ class Task:
             chosen = self.methods[method]
         else:
             raise input_error("method", f"there is no `{method}`", f"one of {', '.join(self.methods)}")
-        scenario = Scenario(self.path)
-        chosen = {**chosen, **(keys or {})}
-        return scenario.set(chosen) if chosen else scenario
+        return with_keys(self.path, {**chosen, **(keys or {})})
 
     def setting(self, keys: Mapping[str, Any] | None = None, max_cycles: int | None = None) -> Setting:
         """Returns what the parts of the task are made for."""
@@ -145,9 +143,25 @@ class Task:
         team = acting_team(Simulation(scenario).teams)
         names = {space.name: space for space in team.observation_spaces}
         # The file says where agents are to go, which those that take orders are not told.
-        own = Scenario(self.path)
-        described = own.set(keys) if keys else own
+        described = with_keys(self.path, keys or {})
         return Setting(described.to_dict(), team, names, max_cycles or scenario.cycles)
+
+
+def with_keys(path: Path, keys: Mapping[str, Any]) -> Scenario:
+    """Returns a scenario with other values of some keys, and without those whose value is None."""
+    scenario = Scenario(path)
+    without = [key for key, value in keys.items() if value is None]
+    if without:
+        content = scenario.to_dict()
+        for key in without:
+            *places, last = (int(place) if place.isdecimal() else place for place in key.split("."))
+            part: Any = content
+            for place in places:
+                part = part[place]
+            part.pop(last, None)
+        scenario = Scenario(content, base=path.parent)
+    rest = {key: value for key, value in keys.items() if value is not None}
+    return scenario.set(rest) if rest else scenario
 
 
 def acting_team(teams: list[Team]) -> Team:

@@ -105,6 +105,15 @@ class TaskBatch(Batch):
             for space in (self.single_observation_space, self.single_action_space)
         )
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Functions within functions are not pickled: the parts of the task are made again.
+        return {name: value for name, value in vars(self).items() if name not in ("design", "encoder")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.design = self.task.design(self.setting)
+        self.encoder = Encoder(self.design.features)
+
     @property
     def team_number(self) -> int:
         """The number of the team that acts."""
@@ -254,7 +263,9 @@ class TaskVectorEnv(VectorEnv):
 
     def __init__(self, task: Task, num_envs: int, **options: Any) -> None:
         agents = len(task.setting(options.get("keys")).team)
-        self._wrap(TaskBatch(task, worlds_of(num_envs, agents), **options))
+        #: The worlds.
+        self.tasks = TaskBatch(task, worlds_of(num_envs, agents), **options)
+        self._wrap(self.tasks)
 
 
 def chosen_terms(known: Mapping[str, RewardTerm], weights: Mapping[str, float] | None) -> dict[str, RewardTerm]:

@@ -124,11 +124,11 @@ def _mask(count: int, arrays: Arrays) -> NDArray[np.bool_]:
 
 
 def _acts(before: Arrays, after: Arrays) -> NDArray[np.bool_]:
-    return (before["due"] > 0) & (after["due"] > 0)
+    return np.asarray((before["due"] > 0) & (after["due"] > 0))
 
 
 def _has_arrived(before: Arrays, after: Arrays) -> NDArray[np.bool_]:
-    return (before["due"] > 0) & (after["due"] == 0)
+    return np.asarray((before["due"] > 0) & (after["due"] == 0))
 
 
 def _measure_arrival(before: Arrays, after: Arrays) -> NDArray[Any]:
@@ -142,7 +142,7 @@ def _measure_delay(before: Arrays, after: Arrays) -> NDArray[Any]:
 def _measure_near(before: Arrays, after: Arrays) -> NDArray[Any]:
     distance_m = np.sqrt((after["neighbor_place_m"] * after["neighbor_place_m"]).sum(axis=2))
     is_near = (after["neighbor_id"] >= 0) & (distance_m < after["neighbor_separation_m"])
-    return is_near.any(axis=1).astype(float)
+    return np.asarray(is_near.any(axis=1), float)
 
 
 def _measure_progress(before: Arrays, after: Arrays) -> NDArray[Any]:
@@ -180,7 +180,7 @@ def _cost(metrics: Mapping[str, Any], tracked: Arrays) -> float:
     share_missing = missing / metrics["airplanes"]
     arrived_percent = 0.0 if delay_percent is None else float(delay_percent)
     losses = float(metrics["losses_of_separation"])
-    return arrived_percent * (1.0 - share_missing) + 100.0 * share_missing + LOSS_PERCENT * losses
+    return float(arrived_percent * (1.0 - share_missing) + 100.0 * share_missing + LOSS_PERCENT * losses)
 
 
 DELAY = Score(

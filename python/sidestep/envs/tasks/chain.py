@@ -110,7 +110,7 @@ class LineTracker:
         if near_m is not None:
             away_m = np.abs(np.arange(len(self._line_m)) * LINE_STEP_M - near_m[:, None])
             distance_m = np.where(away_m <= 1.0, distance_m, np.inf)
-        return distance_m.argmin(axis=1) * LINE_STEP_M
+        return np.asarray(distance_m.argmin(axis=1) * LINE_STEP_M)
 
 
 def middle_line(corridor: Mapping[str, Any]) -> NDArray[np.float64]:
@@ -140,17 +140,18 @@ def _own_state(setting: Setting) -> list[Feature]:
     ]
 
 
+def _part(name: str, number: int, arrays: Arrays) -> NDArray[Any]:
+    """Returns what an array has of one of its parts, such as a connector."""
+    return np.asarray(arrays[name][:, number])
+
+
 def _clearances(setting: Setting, connectors: range, axes: str) -> list[Feature]:
     look_m = setting.spaces["gap_m"].high
     features = []
     for k in connectors:
-        features.append(
-            scaled(f"gap_{k}", f"gap of connector {k} in m", lambda arrays, k=k: arrays["gap_m"][:, k], 0, look_m)
-        )
+        features.append(scaled(f"gap_{k}", f"gap of connector {k} in m", partial(_part, "gap_m", k), 0, look_m))
         meaning = f"way from connector {k} to the nearest obstacle"
-        features.append(
-            vector(f"nearest_{k}", meaning, lambda arrays, k=k: arrays["nearest_m"][:, k], 2 * look_m, axes)
-        )
+        features.append(vector(f"nearest_{k}", meaning, partial(_part, "nearest_m", k), 2 * look_m, axes))
     return features
 
 
@@ -187,7 +188,7 @@ def _measure_approach(connector: int, before: Arrays, after: Arrays) -> NDArray[
     """Meters nearer to the target that was to be reached."""
     was_m = before["target_m"] - before["joints_m"][:, connector]
     is_m = before["target_m"] - after["joints_m"][:, connector]
-    return np.sqrt((was_m * was_m).sum(axis=1)) - np.sqrt((is_m * is_m).sum(axis=1))
+    return np.asarray(np.sqrt((was_m * was_m).sum(axis=1)) - np.sqrt((is_m * is_m).sum(axis=1)))
 
 
 def _measure_veto(before: Arrays, after: Arrays) -> NDArray[Any]:
@@ -219,9 +220,7 @@ def _reach_design(setting: Setting) -> Design:
         vector("target_near", "way from the tip to the target", partial(_offset_of_target, tip), 0.1 * reach_m, axes),
         vector("tip", "place of the tip", lambda arrays: arrays["joints_m"][:, tip], reach_m, axes),
         *(
-            vector(
-                f"connector_{k}", f"place of connector {k}", lambda arrays, k=k: arrays["joints_m"][:, k], reach_m, axes
-            )
+            vector(f"connector_{k}", f"place of connector {k}", partial(_part, "joints_m", k), reach_m, axes)
             for k in bends
         ),
         *_clearances(setting, range(connectors), axes),
@@ -271,6 +270,9 @@ def _corridor_design(setting: Setting) -> Design:
     def own(vectors: NDArray[Any], arrays: Arrays) -> NDArray[Any]:
         return _in_line_frame(line_m, vectors, arrays)
 
+    def own_part(name: str, number: int, arrays: Arrays) -> NDArray[Any]:
+        return own(_part(name, number, arrays), arrays)
+
     def ahead(by_m: float, arrays: Arrays) -> NDArray[Any]:
         number = np.minimum(np.rint((arrays["along_m"] + by_m) / LINE_STEP_M).astype(np.int64), last)
         return own(line_m[number] - arrays["joints_m"][:, 0], arrays)
@@ -293,11 +295,9 @@ def _corridor_design(setting: Setting) -> Design:
     ]
     for k in range(WATCHED):
         look_m = setting.spaces["gap_m"].high
-        gap = scaled(f"gap_{k}", f"gap of connector {k} in m", lambda arrays, k=k: arrays["gap_m"][:, k], 0, look_m)
+        gap = scaled(f"gap_{k}", f"gap of connector {k} in m", partial(_part, "gap_m", k), 0, look_m)
         meaning = f"way from connector {k} to the nearest wall"
-        nearest = vector(
-            f"nearest_{k}", meaning, lambda arrays, k=k: own(arrays["nearest_m"][:, k], arrays), width_m, "ahead left"
-        )
+        nearest = vector(f"nearest_{k}", meaning, partial(own_part, "nearest_m", k), width_m, "ahead left")
         features += [gap, nearest]
     features += [
         *_own_state(setting),

@@ -134,7 +134,7 @@ def mask_of_contacts(choices: int, arrays: Arrays) -> NDArray[np.bool_]:
 
 def _reached(before: Arrays, after: Arrays) -> NDArray[np.bool_]:
     near = (before["goal_steps"] >= 0) & (before["goal_steps"] <= 2)
-    return near & (after["goal_steps"] - before["goal_steps"] >= MIN_JUMP_BOXES)
+    return np.asarray(near & (after["goal_steps"] - before["goal_steps"] >= MIN_JUMP_BOXES))
 
 
 def _measure_goal(before: Arrays, after: Arrays) -> NDArray[Any]:
@@ -160,7 +160,7 @@ def _measure_first_visit(before: Arrays, after: Arrays) -> NDArray[Any]:
 
 
 def _measure_moved(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return np.abs(after["at_boxes"] - before["at_boxes"]).sum(axis=1).astype(float)
+    return np.asarray(np.abs(after["at_boxes"] - before["at_boxes"]).sum(axis=1), float)
 
 
 GOAL_REWARDS = {
@@ -200,14 +200,16 @@ class VisitTracker:
     def __init__(self, side_boxes: int, rows: int) -> None:
         # A margin on all sides, so that windows need no bounds.
         self._margin = self.SIDE // 2
-        full = side_boxes + 2 * self._margin
-        self._visits = np.zeros((rows, full, full), np.float32)
-        reach = np.arange(-self._margin, self._margin + 1)
-        ahead, left = np.meshgrid(reach[::-1], reach[::-1], indexing="ij")
-        # For each heading the offsets in columns and rows of the window's boxes, from ahead and left to behind and right.
+        self._width = side_boxes + 2 * self._margin
+        # One map after the other, each row by row.
+        self._visits = np.zeros(rows * self._width**2, np.float32)
+        self._first = np.arange(rows) * self._width**2
+        reach = np.arange(self._margin, -self._margin - 1, -1)
+        ahead, left = (grid.ravel() for grid in np.meshgrid(reach, reach, indexing="ij"))
+        # For each heading the offsets of the window's boxes, from ahead and left to behind and right.
         self._offsets = np.array(
-            [[ahead * col - left * row, ahead * row + left * col] for col, row in STEPS.tolist()]
-        ).reshape(4, 2, -1)
+            [(ahead * row + left * col) * self._width + ahead * col - left * row for col, row in STEPS.tolist()]
+        )
         self.arrays = {
             "visits": np.zeros((rows, self.SIDE**2), np.float32),
             "first_visit": np.zeros(rows, bool),
@@ -215,7 +217,7 @@ class VisitTracker:
 
     def restart(self, mask: NDArray[np.bool_], observed: Arrays) -> None:
         """Forgets all visits but that of the start."""
-        self._visits[mask] = 0.0
+        self._visits.reshape(len(mask), -1)[mask] = 0.0
         self._visit(mask, observed)
         self.arrays["first_visit"][mask] = False
 
@@ -224,13 +226,13 @@ class VisitTracker:
         self._visit(mask, observed)
 
     def _visit(self, mask: NDArray[np.bool_], observed: Arrays) -> None:
+        col, row = observed["at_boxes"].T
+        here = self._first + (row + self._margin) * self._width + col + self._margin
         rows = np.flatnonzero(mask)
-        col, row = (observed["at_boxes"][rows] + self._margin).T
-        self.arrays["first_visit"][rows] = self._visits[rows, row, col] == 0.0
-        self._visits[rows, row, col] = 1.0
-        cols, rows_of_map = self._offsets[observed["heading"][rows]].transpose(1, 0, 2)
-        window = self._visits[rows[:, None], row[:, None] + rows_of_map, col[:, None] + cols]
-        self.arrays["visits"][rows] = window
+        self.arrays["first_visit"][rows] = self._visits[here[rows]] == 0.0
+        self._visits[here[rows]] = 1.0
+        boxes = here[:, None] + self._offsets[observed["heading"]]
+        np.take(self._visits, boxes, out=self.arrays["visits"], mode="clip")
 
 
 def _exploration_design(setting: Setting) -> Design:

@@ -1,0 +1,417 @@
+"""Tasks: what they promise to learners, by the checkers of the libraries whose interfaces they have."""
+
+import copy
+import pickle
+import re
+import subprocess
+
+import numpy as np
+import pytest
+
+import sidestep
+
+gymnasium = pytest.importorskip("gymnasium")
+pettingzoo = pytest.importorskip("pettingzoo")
+
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+from gymnasium.vector import AutoresetMode  # noqa: E402
+from pettingzoo.test import parallel_api_test, parallel_seed_test  # noqa: E402
+
+from sidestep.envs import tasks  # noqa: E402
+
+TASKS = list(tasks.TASKS)
+TEAMS = [name for name, task in tasks.TASKS.items() if not task.is_single]
+ALONE = [name for name, task in tasks.TASKS.items() if task.is_single]
+
+
+def allowed(rng, batch, infos):
+    """Draws actions among those that the masks allow."""
+    if "action_mask" not in infos or batch.single_action_space.shape != ():
+        return batch.action_space.sample()
+    masks = infos["action_mask"]
+    return (rng.random(masks.shape) * masks).argmax(axis=-1)
+
+
+def greedy(observed, masks, batch):
+    """Goes to the goal by what a robot observes of it: ahead, if that is nearer, else it turns there."""
+    names = [name for name, _ in batch.observation_parts]
+    first = names.index("goal_nearer")
+    ahead, left, _, right = observed[:, first : first + 4].T
+    return np.where(ahead > 0, 0, np.where(left > 0, 1, np.where(right > 0, 2, 1)))
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_gymnasium_makes_each_and_its_checker_passes(name):
+    env = gymnasium.make(f"sidestep.envs:sidestep/{name}", render_mode="rgb_array", width=64)
+    assert env.spec.id == f"sidestep/{name}"
+    check_env(env.unwrapped, skip_render_check=True)
+    env.reset(seed=1)
+    assert max(env.render().shape[:2]) == 64
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_the_tests_of_pettingzoo_pass(name):
+    parallel_api_test(tasks.parallel_env(name), num_cycles=40)
+    parallel_seed_test(lambda: tasks.parallel_env(name), num_cycles=10)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_observations_are_floats_in_bounds_with_a_meaning_for_each_number(name):
+    batch = tasks.batch_env(name, 3)
+    parts = batch.observation_parts
+    assert len(parts) == batch.single_observation_space.shape[0] == batch.encoder.size
+    assert len(set(parts)) == len(parts), "no two numbers mean the same"
+    batch.action_space.seed(1)
+    observed, infos = batch.reset(seed=1)
+    rng = np.random.default_rng(1)
+    changed = np.zeros(len(parts), bool)
+    first = observed.copy()
+    for _ in range(60):
+        observed, *_, infos = batch.step(allowed(rng, batch, infos))
+        assert batch.observation_space.contains(observed)
+        assert observed.dtype == np.float32
+        changed |= (observed != first).any(axis=(0, 1))
+    assert changed.mean() > 0.4, [part for part, one in zip(parts, changed, strict=True) if not one]
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_the_scenario_file_is_one_that_the_command_takes(name, command):
+    done = subprocess.run([command, "check", str(tasks.TASKS[name].path)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_seeds_in_are_seeds_used(name):
+    batch = tasks.batch_env(name, 3)
+    _, infos = batch.reset(seed=40)
+    assert infos["seed"].tolist() == batch.worlds.seeds.tolist() == [40, 41, 42]
+    _, infos = batch.reset()
+    assert len({*infos["seed"].tolist(), 40, 41, 42}) == 6, "further episodes have other seeds"
+
+
+@pytest.mark.parametrize("name", ["CorridorCounterflow-v0", "ReachInClutter-v0", "Superconflict-v0"])
+def test_actions_and_seeds_alone_make_the_episode(name):
+    def play(worlds, workers):
+        batch = tasks.batch_env(name, worlds, workers=workers)
+        space = batch.single_action_space
+        rng = np.random.default_rng(5)
+        returns = np.zeros(batch._shape)
+        batch.reset(seed=7)
+        for _ in range(30):
+            one = rng.random((1, batch._shape[1], *space.shape))
+            one = 2 * one - 1 if space.shape else (one * space.n).astype(np.int64)
+            _, rewards, *_ = batch.step(np.repeat(one, worlds, axis=0))
+            returns += rewards
+        return returns[0], batch.worlds.digests[0]
+
+    alone, digest = play(1, 1)
+    among, same = play(3, 2)
+    assert digest == same
+    np.testing.assert_array_equal(alone, among)
+
+
+def total(name, act, cycles=150, worlds=4, **options):
+    """Returns the mean reward of an agent and episode."""
+    batch = tasks.batch_env(name, worlds, max_cycles=cycles, **options)
+    observed, infos = batch.reset(seed=1)
+    sums = np.zeros(batch._shape)
+    going = np.ones(worlds, bool)
+    for _ in range(cycles):
+        observed, rewards, terminated, truncated, infos = batch.step(act(batch, observed))
+        sums += rewards * going[:, None]
+        going &= ~(terminated | truncated)
+    return sums.mean()
+
+
+def stay(batch, observed):
+    space = batch.single_action_space
+    if isinstance(space, gymnasium.spaces.Box):
+        return np.zeros((*batch._shape, *space.shape))
+    if isinstance(space, gymnasium.spaces.MultiDiscrete):
+        return np.broadcast_to([3, 0], (*batch._shape, 2))
+    words = batch.design.actions.parts
+    return np.full(batch._shape, words.index("stay"))
+
+
+@pytest.mark.parametrize("name", ["CorridorCounterflow-v0", "WarehouseStream-v0", "OfficeDeliveries-v0"])
+def test_a_robot_that_goes_to_its_goals_earns_more_than_one_that_stands(name):
+    alone = {"keys": {"robots.0.count": 1}}
+
+    def go(batch, observed):
+        rows = observed.reshape(-1, observed.shape[2])
+        return greedy(rows, None, batch).reshape(batch._shape)
+
+    assert total(name, stay, **alone) < 0
+    assert total(name, go, **alone) > 2
+
+
+def test_chains_that_go_to_their_targets_earn_more_than_those_that_stand():
+    def go(batch, observed):
+        target = [name for name, _ in batch.observation_parts].index("target_near")
+        return observed[:, :, target : target + 2]
+
+    assert total("ReachInClutter-v0", go, 300) > total("ReachInClutter-v0", stay, 300) + 0.5
+
+    def ahead(batch, observed):
+        way = observed[:, :, :2]
+        return way / np.linalg.norm(way, axis=2, keepdims=True)
+
+    assert total("WindingCorridor-v0", ahead, 300) > 0 > total("WindingCorridor-v0", stay, 300)
+
+
+def test_airplanes_that_fly_to_their_way_points_earn_more_than_those_that_circle():
+    def go(batch, observed):
+        return np.full(batch._shape, batch.single_action_space.n - 1)
+
+    def circle(batch, observed):
+        return np.zeros(batch._shape, np.int64)
+
+    for name in ("Superconflict-v0", "MixedSpeeds-v0"):
+        assert total(name, go, 200) > total(name, circle, 200) + 1
+
+
+def test_airplanes_that_have_arrived_leave_the_agents():
+    env = tasks.parallel_env("MixedSpeeds-v0")
+    env.reset(seed=2)
+    way_point = env.action_space(env.possible_agents[0]).n - 1
+    everybody, ends = set(env.agents), {}
+    while env.agents:
+        acting = set(env.agents)
+        seen, rewards, terminated, truncated, infos = env.step(dict.fromkeys(env.agents, way_point))
+        assert acting == set(seen) == set(rewards) == set(infos)
+        for agent in acting:
+            if terminated[agent]:
+                assert agent not in env.agents
+                assert rewards[agent] > 0, "it has arrived"
+                ends[agent] = infos[agent]
+    assert set(ends) == everybody
+    last = list(ends.values())[-1]
+    assert last["metrics"]["arrived"] == last["metrics"]["airplanes"]
+    assert last["score"] >= last["metrics"]["mean_delay_percent"]
+
+
+def test_a_cut_episode_is_truncated_and_one_that_is_done_is_terminated():
+    env = tasks.make("WindingCorridor-v0", max_cycles=5)
+    env.reset(seed=1)
+    for k in range(5):
+        _, _, terminated, truncated, infos = env.step(np.zeros(2))
+        assert (terminated, truncated) == (False, k == 4)
+    assert infos["score"] == 0.0 and infos["metrics"]["vetoes"] == 0
+    with pytest.raises(sidestep.InputError, match="the episode of world 0 has ended"):
+        env.step(np.zeros(2))
+    done = tasks.make("ReachInClutter-v0")
+    done.reset(seed=1)
+    done.batch._tracker._is_visited[:] = True
+    done.batch._tracker.arrays["targets_reached"][:] = 8
+    assert done.step(np.zeros(2))[2:4] == (True, False)
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_worlds_restart_in_the_next_or_in_the_same_step(mode):
+    env = tasks.vector_env("CorridorCounterflow-v0", 20, max_cycles=3, autoreset_mode=mode)
+    assert env.metadata["autoreset_mode"] is mode and env.num_envs == 20 and env.batch.num_worlds == 2
+    first, _ = env.reset(seed=3)
+    actions = np.zeros(20, np.int64)
+    for _ in range(3):
+        observed, rewards, terminated, truncated, infos = env.step(actions)
+    assert truncated.all() and not terminated.any()
+    assert np.isfinite(infos["score"]).all() and infos["metrics"][0]["trips"] == 0
+    left = [name for name, _ in env.batch.observation_parts].index("time_left")
+    if mode is AutoresetMode.SAME_STEP:
+        assert (observed[:, left] == 1).all() and all(last[left] == -1 for last in infos["final_obs"])
+        assert infos["_seed"].all() and len(set(infos["seed"].tolist())) == 2
+    else:
+        assert (observed[:, left] == -1).all() and "final_obs" not in infos
+        observed, rewards, *_, infos = env.step(actions)
+        assert (observed[:, left] == 1).all() and not rewards.any() and infos["_seed"].all()
+
+
+def test_rewards_are_terms_with_weights_by_name():
+    both = tasks.batch_env("Exploration-v0", 2, rewards={"first_visit": 1.0, "time": -0.5})
+    both.reset(seed=1)
+    _, rewards, *_ = both.step(np.zeros((2, 1), np.int64))
+    parts = both.reward_parts()
+    assert set(parts) == {"first_visit", "time"}
+    np.testing.assert_allclose(sum(parts.values()), rewards)
+    with pytest.raises(sidestep.InputError, match="rewards.speed: there is no such term\n  help: one of first_visit"):
+        tasks.make("Exploration-v0", rewards={"speed": 1})
+    with pytest.raises(sidestep.InputError, match="rewards.time: its weight is nan"):
+        tasks.make("Exploration-v0", rewards={"time": float("nan")})
+
+
+def test_goals_that_are_rewarded_are_trips_that_are_counted():
+    batch = tasks.batch_env("WarehouseStream-v0", 2, keys={"robots.0.count": 1})
+    observed, infos = batch.reset(seed=4)
+    goals, ended = np.zeros(2), False
+    while not ended:
+        rows = observed.reshape(-1, observed.shape[2])
+        observed, _, _, truncated, infos = batch.step(greedy(rows, None, batch).reshape(batch._shape))
+        goals += batch.reward_parts()["goal"].sum(axis=1)
+        ended = truncated.any()
+    # Each trip has two goals, and the one that is under way has reached one at most.
+    trips = np.array([one["trips"] for one in infos["metrics"]])
+    assert (trips > 3).all()
+    assert set((goals - 2 * trips).tolist()) <= {0.0, 1.0}
+
+
+def test_masks_are_in_infos_and_where_asked_for_in_observations():
+    env = tasks.make("Exploration-v0", mask=True)
+    observed, infos = env.reset(seed=1)
+    assert set(observed) == {"observation", "action_mask"}
+    np.testing.assert_array_equal(observed["action_mask"], infos["action_mask"])
+    np.testing.assert_array_equal(env.action_masks(), infos["action_mask"].astype(bool))
+    assert env.observation_space.contains(observed)
+    # Into a wall, and again: the second time makes no sense.
+    blocked = False
+    for _ in range(60):
+        observed, *_ = env.step(0)
+        blocked = blocked or observed["action_mask"][0] == 0
+    assert blocked
+
+
+def test_wrong_input_names_the_argument():
+    with pytest.raises(
+        sidestep.InputError, match="task: there is no `Nothing-v0`\n  help: one of CorridorCounterflow-v0"
+    ):
+        tasks.make("Nothing-v0")
+    with pytest.raises(
+        sidestep.InputError, match="num_envs: 7 is no multiple of the 10 agents of a world\n  help: give 10"
+    ):
+        tasks.vector_env("CorridorCounterflow-v0", 7)
+    with pytest.raises(sidestep.InputError, match="render_mode: there is no `video`"):
+        tasks.make("Exploration-v0", render_mode="video")
+    env = tasks.parallel_env("CorridorCounterflow-v0")
+    with pytest.raises(sidestep.InputError, match="no episode is in progress"):
+        env.step({})
+    env.reset(seed=1)
+    with pytest.raises(sidestep.InputError, match="`robot_0` has no action"):
+        env.step({})
+    with pytest.raises(sidestep.InputError, match="there is no agent `robot_77`"):
+        env.step({**dict.fromkeys(env.agents, 0), "robot_77": 0})
+    batch = tasks.batch_env("CorridorCounterflow-v0", 1)
+    batch.reset(seed=1)
+    with pytest.raises(
+        sidestep.InputError, match=re.escape("their shape is (3,)\n  help: give an array of the shape (1, 10)")
+    ):
+        batch.step(np.zeros(3, int))
+    with pytest.raises(sidestep.InputError, match="one is no choice\n  help: give whole numbers from 0 to 3"):
+        batch.step(np.full((1, 10), 4))
+    with pytest.raises(sidestep.InputError, match="one is not a finite number"):
+        arm = tasks.batch_env("RailArm-v0", 1)
+        arm.reset(seed=1)
+        arm.step(np.full((1, 1, 3), np.nan))
+
+
+def test_copies_and_pickles_go_on_alike():
+    env = tasks.parallel_env("RadioHall-v0")
+    env.reset(seed=6)
+    draws = np.random.default_rng(2)
+    actions = {agent: np.array([draws.integers(4), draws.integers(4)]) for agent in env.agents}
+    env.step(actions)
+    for other in (env.copy(), copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
+        seen = other.step(actions)
+        assert other.batch.worlds.digests != env.batch.worlds.digests
+    expected = env.step(actions)
+    assert other.batch.worlds.digests == env.batch.worlds.digests
+    for agent in env.agents:
+        np.testing.assert_array_equal(seen[0][agent], expected[0][agent])
+    assert seen[1] == expected[1]
+
+
+def test_arrays_are_handed_to_others_without_a_copy():
+    batch = tasks.batch_env("CorridorCounterflow-v0", 2, copy=False)
+    observed, _ = batch.reset(seed=1)
+    shared = np.from_dlpack(observed)
+    assert np.shares_memory(shared, observed)
+
+
+# Scores, and boards of them.
+
+
+def way_point_policy(observed, masks):
+    return np.full(len(observed), masks.shape[1] - 1)
+
+
+def test_a_policy_is_judged_as_the_scripted_method_that_does_the_same():
+    # With the shield, straight flight to the way-points is what an airplane without a method does.
+    task = tasks.find_task("Superconflict-v0")
+    ours = tasks.judge(task, way_point_policy, runs=4, seed=9)
+    theirs = tasks.judge_method(task, "straight", runs=4, seed=9)
+    assert ours.seeds.tolist() == theirs.seeds.tolist() == [9, 10, 11, 12]
+    np.testing.assert_allclose(ours.scores, theirs.scores, rtol=0.5)
+    best = tasks.judge_method(task, "pc", runs=4, seed=9)
+    assert best.beats(theirs) and not theirs.beats(best)
+    with pytest.raises(sidestep.InputError, match="of another task or of other seeds"):
+        best.compare(tasks.judge_method(task, "pc", runs=3, seed=9))
+
+
+def test_policies_and_methods_are_compared_seed_by_seed():
+    found = sidestep.compare(
+        "sidestep/Superconflict-v0", methods={"pc": "pc", "way-point": way_point_policy, "straight": "straight"}, runs=3
+    )
+    assert [one["method"] for one in found["methods"]] == ["pc", "way-point", "straight"]
+    pairs = found["methods"][1]["first_less_this"]
+    assert pairs["verdict"] == "beats it" and pairs["interval"][1] < 0
+    assert re.search(r"^pc +1\.\d+ \[.*\nway-point .* pc beats it: +-", str(found), re.M)
+    assert str(found) in found._repr_html_().replace("&#x27;", "'")
+    task = tasks.find_task("Exploration-v0")
+    assert len(sidestep.compare(task, runs=2)["methods"]) == len(task.methods)
+    with pytest.raises(sidestep.InputError, match="method: there is no `bees`\n  help: one of wander, random"):
+        sidestep.compare(task, methods=["bees"], runs=1)
+    with pytest.raises(sidestep.InputError, match="the scenario is no task"):
+        sidestep.compare({"world": "airspace"}, methods={"mine": way_point_policy})
+
+
+def test_a_leaderboard_is_written_read_and_replayed(tmp_path, command):
+    task = tasks.find_task("ReachInClutter-v0")
+
+    def toward(observed, masks):
+        return observed[:, 2:4].astype(np.float64)
+
+    weights = tmp_path / "weights.txt"
+    weights.write_text("none")
+    board = tasks.write_leaderboard(
+        tmp_path / "board", task, {"toward": toward, "targets": "targets"}, runs=3, recorded=1, files=[weights]
+    )
+    assert set(board.ranking) == {"toward", "targets"}
+    again = tasks.Leaderboard.read(tmp_path / "board")
+    assert str(again) == str(board) and "ReachInClutter-v0" in str(board)
+    assert (tmp_path / "board/files/weights.txt").exists()
+    assert len(board.runs) == 2
+    for run in board.runs:
+        done = subprocess.run([command, "replay", str(run)], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        digest = board.judgments[run.parent.name].digests[0]
+        assert digest in done.stdout + done.stderr
+    with pytest.raises(sidestep.InputError, match="exists already"):
+        tasks.write_leaderboard(tmp_path / "board", task, {"targets": "targets"}, runs=1)
+    with pytest.raises(sidestep.InputError, match="is no leaderboard"):
+        tasks.Leaderboard.read(tmp_path)
+
+
+# Libraries of learners, where they are installed.
+
+
+def test_stable_baselines_learns_on_it():
+    sb3 = pytest.importorskip("stable_baselines3")
+    env = tasks.sb3_env("CorridorCounterflow-v0", 20, max_cycles=8)
+    env.seed(3)
+    observed = env.reset()
+    for _ in range(8):
+        observed, rewards, ended, infos = env.step(np.zeros(20, np.int64))
+    assert ended.all() and infos[0]["TimeLimit.truncated"]
+    assert not np.array_equal(infos[0]["terminal_observation"], observed[0])
+    assert env.env_method("action_masks", indices=[1])[0].dtype == bool
+    sb3.PPO("MlpPolicy", env, n_steps=16, batch_size=64, n_epochs=1, device="cpu").learn(320)
+
+
+def test_torchrl_checks_it():
+    pytest.importorskip("torchrl")
+    from torchrl.envs.utils import check_env_specs
+
+    for name in ("CorridorCounterflow-v0", "ReachInClutter-v0", "RadioHall-v0"):
+        env = tasks.torchrl_env(name, 3)
+        env.set_seed(1)
+        check_env_specs(env)
+        rollout = env.rollout(5)
+        assert rollout["agents", "observation"].shape[:2] == (3, 5)
