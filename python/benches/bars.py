@@ -317,8 +317,59 @@ def loading() -> None:
     told("import sidestep, beside NumPy", f"{took:.0f} ms, {size:.1f} MB", "100 ms, 15 MB")
 
 
+#: A program that learns from as many rows as its last argument says. It prints the CPU seconds, and the memory in MB
+#: beside the columns at its peak.
+LEARNING = """
+import resource, sys, numpy as np
+from sidestep import learn
+rng, n = np.random.default_rng(1), int(sys.argv[2])
+code = rng.integers(0, 4, n)
+moves = {
+    "action": np.array(["forward", "left", "right", "stay"])[code],
+    "ahead_boxes": (code == 0) + rng.normal(0.0, 0.1, n),
+    "left_boxes": rng.normal(0.0, 0.05, n),
+    "turn_deg": np.array([0.0, 90.0, -90.0, 0.0])[code] + rng.normal(0.0, 5.0, n),
+}
+there = rng.uniform(size=n) < 0.8
+true_m = rng.uniform(0.1, 6.0, n)
+readings = {
+    "true": np.array(["nothing", "wall"])[there.astype(int)],
+    "reported": np.array(["nothing", "wall"])[(there ^ (rng.uniform(size=n) < 0.05)).astype(int)],
+    "true_distance_m": true_m,
+    "reported_distance_m": np.abs(true_m + rng.normal(0.0, 0.05, n)),
+}
+del code, there, true_m
+# What was needed to make the columns may be more than what learning needs: it is filled to the peak before.
+used = lambda: resource.getrusage(resource.RUSAGE_SELF)
+resident = int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize()
+filled = np.ones(max(0, used().ru_maxrss * 1024 - resident), np.uint8)
+before = used()
+if sys.argv[1] == "effector":
+    learn.effector(moves)
+else:
+    learn.sensor(readings)
+after = used()
+took_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+print(took_s, (after.ru_maxrss - before.ru_maxrss) * 1024 / 1e6)
+"""
+
+
+def learning() -> None:
+    """Error models from 10 million rows of arrays, in a process of its own, which has a peak of its own."""
+    for kind in ("effector", "sensor"):
+        line = [sys.executable, "-c", LEARNING, kind, "10000000"]
+        done = subprocess.run(line, capture_output=True, text=True, check=True)
+        took_s, size_mb = map(float, done.stdout.split())
+        figure = f"{took_s:.1f} CPU s, {size_mb:.0f} MB"
+        told(
+            f"an {kind} of 10 million rows, beside the columns" if kind == "effector" else f"a {kind} of as many",
+            figure,
+            "5 CPU s, 300 MB",
+        )
+
+
 if __name__ == "__main__":
     for part in (
-        steps, behavior, classes, worlds, resets, table, threads, interrupts, environments, sweeps, loading,
+        steps, behavior, classes, worlds, resets, table, threads, interrupts, environments, sweeps, loading, learning,
     ):  # fmt: skip
         part()

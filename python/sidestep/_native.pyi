@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._arm import ArmTrajectory, FkResult, IkResult
 from ._engines import Trial
 from ._inspect import Finding
+from ._progress import Progress
 from ._status import SweepStatus
 from ._sweep import Sweep
 from .collectives import MinimizeResult
@@ -146,6 +147,7 @@ class Simulation:
         *,
         decide: _Decide | Mapping[str | int, _Decide] | None = None,
         state: Any = None,
+        progress: Progress | None = None,
     ) -> int: ...
     @property
     def scenario(self) -> Scenario: ...
@@ -323,6 +325,7 @@ def run_sweep(
     out: str | PathLike[str] | None,
     workers: int,
     begin: Callable[[str, list[Trial], list[str] | None], Any] | None,
+    progress: Progress | None = None,
 ) -> Sweep: ...
 def run_task(
     build: str,
@@ -393,9 +396,7 @@ class LogColumns:
     def add_views(
         self, name: str, views: NDArray[np.uint8], buffers: Sequence[NDArray[np.uint8]], valid: _Validity
     ) -> None: ...
-    def add_codes(
-        self, name: str, codes: NDArray[np.int64], texts: Sequence[str | None], valid: _Validity
-    ) -> None: ...
+    def add_codes(self, name: str, codes: NDArray[np.int64], texts: Sequence[str | None], valid: _Validity) -> None: ...
     def add_characters(self, name: str, characters: NDArray[np.uint32]) -> None: ...
     def add_objects(self, name: str, objects: NDArray[np.object_]) -> None: ...
     def names(self) -> list[str]: ...

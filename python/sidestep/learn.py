@@ -14,16 +14,12 @@ True
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from . import _native
-from ._errors import input_error
+from ._columns import log_columns
 from ._native import Learned
 
 __all__ = ["Learned", "effector", "sensor"]
@@ -53,7 +49,8 @@ def effector(
 ) -> Learned:
     """Learns the outcomes of an effector's actions.
 
-    ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, pyarrow, :class:`sidestep.Table`): ``action``
+    ``moves`` has a row per move, as a dict of columns or a data frame (pandas, polars, pyarrow, :class:`sidestep.Table`, anything
+    with an Arrow stream), whose numbers are not copied: ``action``
     (``"forward"``, ``"left"``, ``"right"``, ``"stay"``), ``ahead_boxes`` and ``left_boxes``, displacements in boxes in the frame
     of the start, ``turn_deg``, positive to the left, and optionally ``contact`` (``"yes"`` where an obstacle stopped it: such rows
     are skipped), ``robot``, a number by which robots that differ are found, ``effector``, and ``delay_cycles``, the steps without
@@ -126,57 +123,16 @@ def sensor(
 def _options(
     columns: Columns, known: Sequence[str], alpha: float, hold_out: int, max_unexplained: float
 ) -> dict[str, Any]:
-    """Returns a table, as CSV text or as the folder that contains it, and how to learn from it."""
+    """Returns a table, as columns or as the folder that contains it, and how to learn from it."""
     options: dict[str, Any] = {
-        "text": None, "run": None, "alpha": alpha, "hold_out_every": hold_out, "max_unexplained": max_unexplained,
+        "columns": None, "run": None, "alpha": alpha, "hold_out_every": hold_out, "max_unexplained": max_unexplained,
         "facts": [],
     }  # fmt: skip
     if isinstance(columns, str | os.PathLike):
         options["run"] = os.fspath(columns)
     else:
-        options["text"] = _csv(columns, known)
+        options["columns"] = log_columns(columns, known)
         if isinstance(columns, _native.Table):
             # A recorded table says of all of its rows what a file would leave out, such as the side of a box.
             options["facts"] = sorted(columns.about.items())
     return options
-
-
-def _csv(columns: Mapping[str, Any] | Any, known: Sequence[str]) -> str:
-    """Returns the columns that are known as CSV text."""
-    names = [name for name in known if _has(columns, name)]
-    if not names:
-        raise input_error("columns", f"there is none of {', '.join(known)}", "give a dict of columns or a data frame")
-    lists = [np.asarray(columns[name]).tolist() for name in names]
-    lengths = {name: len(column) for name, column in zip(names, lists, strict=True)}
-    if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise input_error("columns", f"their lengths differ: {listed}", "give one value of each per row")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([_word(cell) for cell in row] for row in zip(*lists, strict=True))
-    return text.getvalue()
-
-
-def _has(columns: Any, name: str) -> bool:
-    # Arrow's tables have their columns themselves as `columns`.
-    keys = getattr(columns, "column_names", getattr(columns, "columns", None))
-    return name in (columns if keys is None else list(keys))
-
-
-def _is_missing(cell: Any) -> bool:
-    try:
-        return bool(cell != cell)
-    except TypeError:
-        # The missing value of data frames has no truth value in comparisons.
-        return True
-
-
-def _word(cell: Any) -> Any:
-    # A list may hold numbers of NumPy, whose text is none that a table has.
-    cell = cell.item() if isinstance(cell, np.generic) else cell
-    if cell is None or _is_missing(cell):
-        return ""
-    if isinstance(cell, bool):
-        return "yes" if cell else "no"
-    return repr(cell) if isinstance(cell, float) else cell

@@ -1,11 +1,13 @@
 //! Error models of sensors and effectors, learned from tables.
 
-use crate::error;
+use crate::columns::LogColumns;
+use crate::error::{self, argument_error};
 use crate::json::to_python;
+use crate::pickle::{self, Pickle};
 use pyo3::prelude::*;
-use sidestep::import::table::CsvTable;
-use sidestep::kernel::InputError;
+use serde_json::Value;
 use sidestep::learn::EstimateOptions;
+use sidestep::learn::columns::ColumnTable;
 use sidestep::learn::effector::{self, EffectorOptions, LearnedEffector};
 use sidestep::learn::profile;
 use sidestep::learn::sensor::{self, LearnedSensor, RunSensorOptions, SensorOptions};
@@ -13,12 +15,44 @@ use sidestep_session::{RecordedCsv, csv_table};
 use std::path::PathBuf;
 
 /// A learned error model: its counts, probabilities with intervals, and its form in a profile.
+///
+/// What the learner knows beside is not kept: of these parts a pickle makes it again.
 #[pyclass(module = "sidestep", frozen)]
-pub(crate) struct Learned(Model);
+pub(crate) struct Learned {
+    kind: &'static str,
+    /// All the output of `sidestep learn --json`.
+    report: Value,
+    /// The report for people.
+    text: String,
+    /// A profile of it alone.
+    profile: String,
+}
 
-enum Model {
-    Sensor(Box<LearnedSensor>),
-    Effector(Box<LearnedEffector>),
+const SENSOR: &str = "sensor";
+const EFFECTOR: &str = "effector";
+
+impl Learned {
+    fn from_sensor(model: &LearnedSensor) -> PyResult<Self> {
+        Ok(Self {
+            kind: SENSOR,
+            report: serde_json::to_value(&model.report).map_err(|e| json_error(&e))?,
+            text: model.report.to_string(),
+            profile: profile::of_sensor(model).map_err(|e| error::input_error(&e))?,
+        })
+    }
+
+    fn from_effector(model: &LearnedEffector) -> PyResult<Self> {
+        Ok(Self {
+            kind: EFFECTOR,
+            report: serde_json::to_value(&model.report).map_err(|e| json_error(&e))?,
+            text: model.report.to_string(),
+            profile: profile::of_effector(model).map_err(|e| error::input_error(&e))?,
+        })
+    }
+}
+
+fn json_error(error: &serde_json::Error) -> PyErr {
+    error::RecordError::new_err(error.to_string())
 }
 
 #[pymethods]
@@ -26,22 +60,14 @@ impl Learned {
     /// The kind of the device: a sensor or an effector.
     #[getter]
     fn kind(&self) -> &'static str {
-        match self.0 {
-            Model::Sensor(_) => "sensor",
-            Model::Effector(_) => "effector",
-        }
+        self.kind
     }
 
     /// All the output of `sidestep learn --json`: counts, probabilities with their counts and 95 % intervals, thin
     /// rows, tests of the fit on events held out, warnings.
     #[getter]
     fn report(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let value = match &self.0 {
-            Model::Sensor(model) => serde_json::to_value(&model.report),
-            Model::Effector(model) => serde_json::to_value(&model.report),
-        };
-        let value = value.map_err(|e| error::RecordError::new_err(e.to_string()))?;
-        to_python(py, &value)
+        to_python(py, &self.report)
     }
 
     /// Returns the text of a profile with it under this name: a new one, or `text` with it added or replaced.
@@ -52,35 +78,61 @@ impl Learned {
     #[pyo3(signature = (name, text=None))]
     fn profile(&self, name: &str, text: Option<&str>) -> PyResult<String> {
         let empty = profile::empty(name);
-        let text = text.unwrap_or(&empty);
-        let written = match &self.0 {
-            Model::Sensor(model) => profile::with_sensor("profile", text, name, model),
-            Model::Effector(model) => profile::with_effector("profile", text, name, model),
-        };
+        let written = profile::with_learned("profile", text.unwrap_or(&empty), name, &self.profile);
         written.map_err(|e| error::input_error(&e))
     }
 
-    fn __str__(&self) -> String {
-        match &self.0 {
-            Model::Sensor(model) => model.report.to_string(),
-            Model::Effector(model) => model.report.to_string(),
-        }
+    /// Pickles it: a task of a process pool returns what it learned.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<Pickle<'py, (&'static str, String, String, String)>> {
+        let values = (self.kind, self.report.to_string(), self.text.clone(), self.profile.clone());
+        Ok((pickle::maker(py, "unpack_learned")?, values))
+    }
+
+    fn __str__(&self) -> &str {
+        &self.text
     }
 
     fn __repr__(&self) -> String {
-        format!("Learned({})", self.kind())
+        format!("Learned({})", self.kind)
     }
+}
+
+/// Makes a learned error model again.
+///
+/// Raises InputError when the texts are not those of one.
+#[pyfunction]
+pub(crate) fn unpack_learned(
+    kind: &str,
+    report: &str,
+    text: String,
+    profile: String,
+) -> PyResult<Learned> {
+    let damaged = |cause: String| {
+        argument_error("learned", cause, "give the texts that a pickle holds, unchanged")
+    };
+    let kind = match kind {
+        SENSOR => SENSOR,
+        EFFECTOR => EFFECTOR,
+        other => return Err(damaged(format!("`{other}` is no kind of device"))),
+    };
+    let report = serde_json::from_str(report).map_err(|e| damaged(e.to_string()))?;
+    profile::with_learned("profile", &profile::empty("any"), "any", &profile)
+        .map_err(|e| damaged(e.cause().to_string()))?;
+    Ok(Learned { kind, report, text, profile })
 }
 
 /// A table, and how to learn from it, as passed by `sidestep.learn`.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct LearnOptions {
-    /// The table as CSV text.
-    text: Option<String>,
+    /// The columns of the table.
+    columns: Option<Py<LogColumns>>,
     /// Or the folder of a run that recorded it.
     run: Option<PathBuf>,
-    /// What the recording says of all rows of the text, if they come from one.
+    /// What the recording says of all rows of the columns, if they come from one.
     facts: Vec<(String, String)>,
     alpha: f64,
     hold_out_every: usize,
@@ -88,9 +140,13 @@ pub(crate) struct LearnOptions {
 }
 
 impl LearnOptions {
-    /// Returns the table that was passed as text; `name` stands for it in errors.
-    fn parse_table(&self, name: &str) -> Result<CsvTable, InputError> {
-        CsvTable::parse(&name, self.text.as_deref().unwrap_or_default())
+    /// Takes the columns as a table; `name` stands for it in errors.
+    fn take_table(&self, py: Python<'_>, name: &str) -> PyResult<ColumnTable> {
+        let taken = match &self.columns {
+            Some(columns) => columns.borrow_mut(py).take_table(name),
+            None => ColumnTable::new(name, Vec::new()),
+        };
+        taken.map_err(|e| error::input_error(&e))
     }
 
     fn estimate(&self) -> EstimateOptions {
@@ -117,18 +173,16 @@ pub(crate) fn learn_effector(
 ) -> PyResult<Learned> {
     let EffectorChoice { box_m, effector, robots } = choice;
     let chosen = EffectorOptions { estimate: options.estimate(), box_m, effector, robots };
+    let table = options.take_table(py, "motions")?;
     let learned = py.detach(|| match &options.run {
         Some(run) => {
             let recorded = csv_table(run, "motions")?;
             effector::learn_run(&recorded.table, &recorded.facts, &chosen)
         }
-        None if options.facts.is_empty() => {
-            effector::learn_csv(&options.parse_table("motions")?, &chosen)
-        }
-        None => effector::learn_run(&options.parse_table("motions")?, &options.facts, &chosen),
+        None if options.facts.is_empty() => effector::learn_csv(&table, &chosen),
+        None => effector::learn_run(&table, &options.facts, &chosen),
     });
-    let model = learned.map_err(|e| error::input_error(&e))?;
-    Ok(Learned(Model::Effector(Box::new(model))))
+    Learned::from_effector(&learned.map_err(|e| error::input_error(&e))?)
 }
 
 /// The shape of a sensor, as passed by `sidestep.learn.sensor`.
@@ -150,6 +204,7 @@ pub(crate) fn learn_sensor(
     options: LearnOptions,
     shape: SensorShape,
 ) -> PyResult<Learned> {
+    let table = options.take_table(py, "readings")?;
     let learned = py.detach(|| match &options.run {
         Some(run) => {
             let mut recorded = csv_table(run, "readings")?;
@@ -163,7 +218,7 @@ pub(crate) fn learn_sensor(
         }
         None if !options.facts.is_empty() => {
             let chosen = run_options(options.estimate(), shape);
-            sensor::learn_run(&options.parse_table("readings")?, &options.facts, &chosen)
+            sensor::learn_run(&table, &options.facts, &chosen)
         }
         None => {
             let default = SensorOptions::default();
@@ -176,11 +231,10 @@ pub(crate) fn learn_sensor(
                 sensor: shape.sensor,
                 beam: shape.beam,
             };
-            sensor::learn_csv(&options.parse_table("readings")?, &sensor_options)
+            sensor::learn_csv(&table, &sensor_options)
         }
     });
-    let model = learned.map_err(|e| error::input_error(&e))?;
-    Ok(Learned(Model::Sensor(Box::new(model))))
+    Learned::from_sensor(&learned.map_err(|e| error::input_error(&e))?)
 }
 
 /// Returns the options for a recording, which knows what is left out of the shape.

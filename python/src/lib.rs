@@ -9,6 +9,7 @@
 //! read.rs        folders -> tables          inspect.rs      files -> import reports
 //! sweep.rs       many runs, by threads or by an executor
 //! arm.rs         kinematics of arms         learn.rs        error models from tables
+//! columns.rs     arrays and data frames -> tables that are learned from
 //! stats.rs       intervals and pairs        collectives.rs  games of tables or of an objective
 //! json.rs        values of other kinds      notebook.rs     output of notebook cells
 //! result.rs      results, by name           choice.rs       words that choose a value
@@ -27,6 +28,7 @@ mod batch;
 mod blocks;
 mod choice;
 mod collectives;
+mod columns;
 mod error;
 mod inspect;
 mod json;
@@ -96,7 +98,9 @@ fn add_sweeps(module: &Bound<'_, PyModule>) -> PyResult<()> {
 fn add_analysis(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<arm::Arm>()?;
     module.add_function(wrap_pyfunction!(arm::arm_trajectories, module)?)?;
+    module.add_class::<columns::LogColumns>()?;
     module.add_class::<learn::Learned>()?;
+    module.add_function(wrap_pyfunction!(learn::unpack_learned, module)?)?;
     module.add_function(wrap_pyfunction!(collectives::minimize_objective, module)?)?;
     module.add_function(wrap_pyfunction!(collectives::minimize_pairs, module)?)?;
     module.add_function(wrap_pyfunction!(learn::learn_effector, module)?)?;

@@ -1,11 +1,16 @@
 //! Policies: functions in Python that decide for a team, between observing and acting.
 
 use crate::error::OrderError;
+use crate::watch::ProgressReporter;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use sidestep::kernel::control::AgentTeam;
 use sidestep::kernel::{Cycle, RunConfig};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Time between two reports of progress: bars look smooth, and a function costs nothing.
+const REPORT_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A team, preceded by its number.
 pub(crate) type IndexedTeam = (usize, Arc<AgentTeam>);
@@ -41,10 +46,12 @@ pub(crate) fn run_with_policies(
     decide: &Bound<'_, PyAny>,
     state: Option<Bound<'_, PyAny>>,
     until: Cycle,
+    reporter: Option<&ProgressReporter>,
 ) -> PyResult<u64> {
     let policies = team_policies(run, decide)?;
     let state = state.unwrap_or_else(|| PyDict::new(py).into_any());
     let from = run.now(py)?;
+    let mut last_report = Instant::now();
     while run.now(py)? < until && !run.has_ended(py)? {
         let cycle = run.now(py)?;
         for policy in &policies {
@@ -58,8 +65,18 @@ pub(crate) fn run_with_policies(
             return Err(OrderError::new_err(cause));
         }
         run.advance(py)?;
+        if let Some(reporter) = reporter
+            && last_report.elapsed() >= REPORT_INTERVAL
+        {
+            reporter.report(py, cycle + 1, until)?;
+            last_report = Instant::now();
+        }
     }
-    Ok(run.now(py)? - from)
+    let now = run.now(py)?;
+    if let Some(reporter) = reporter {
+        reporter.report(py, now, until)?;
+    }
+    Ok(now - from)
 }
 
 /// Adds the cycle of the run to an exception of a function, in versions of Python that can do so.

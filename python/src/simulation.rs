@@ -11,7 +11,7 @@ use crate::policy::{IndexedTeam, PolicyRun, run_with_policies};
 use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::space::{ObservationBuffers, Team, find_team, team_at};
 use crate::table::Table;
-use crate::watch::{SignalWatcher, TimeSlice};
+use crate::watch::{ProgressReporter, SignalWatcher, TimeSlice};
 use crate::worlds;
 use numpy::PyArray3;
 use pyo3::prelude::*;
@@ -118,12 +118,20 @@ impl Simulation {
     ///
     /// Signals are checked between two slices, while no code holds the run: their handlers are functions of Python on
     /// this thread, and may call the simulation in any way.
-    fn advance_to_goal(&self, py: Python<'_>, mut goal: Goal) -> PyResult<u64> {
+    fn advance_to_goal(
+        &self,
+        py: Python<'_>,
+        mut goal: Goal,
+        reporter: Option<&ProgressReporter>,
+    ) -> PyResult<u64> {
         let mut done = 0;
         loop {
             py.check_signals()?;
             let slice = self.advance_slice(py, goal)?;
             done += slice.done;
+            if let Some(reporter) = reporter {
+                reporter.report(py, slice.now, slice.until)?;
+            }
             if slice.is_last {
                 return Ok(done);
             }
@@ -148,7 +156,7 @@ impl Simulation {
             }
             let now = run.cycle();
             let is_last = now >= until || run.simulation().is_over();
-            Ok(SliceOutcome { done: now - from, is_last })
+            Ok(SliceOutcome { done: now - from, now, until, is_last })
         })
     }
 
@@ -240,6 +248,9 @@ impl Goal {
 struct SliceOutcome {
     /// Cycles done.
     done: u64,
+    /// The cycle of the run, and that to which it goes.
+    now: Cycle,
+    until: Cycle,
     /// Whether the goal is reached, or the run is over.
     is_last: bool,
 }
@@ -333,7 +344,7 @@ impl Simulation {
     /// (1, 5)
     #[pyo3(signature = (cycles=UnsignedArg::new(1)), text_signature = "($self, cycles=1)")]
     fn step(&self, py: Python<'_>, cycles: UnsignedArg) -> PyResult<u64> {
-        self.advance_to_goal(py, Goal::Further(cycles.named("cycles")?))
+        self.advance_to_goal(py, Goal::Further(cycles.named("cycles")?), None)
     }
 
     /// Advances to cycle `until`, by default the planned end, and returns the number of cycles done.
@@ -346,19 +357,29 @@ impl Simulation {
     /// ...     return (observed["contact"] > 0).astype(int)        # left where it touched something, else forward
     /// >>> sim.run(30, decide=decide)
     /// 20
-    #[pyo3(signature = (until=None, *, decide=None, state=None))]
+    ///
+    /// `progress` is a function that is told the cycle and the last one now and then, or True for a bar of tqdm.
+    #[pyo3(signature = (until=None, *, decide=None, state=None, progress=None))]
     fn run(
         slf: &Bound<'_, Self>,
         until: Option<UnsignedArg>,
         decide: Option<&Bound<'_, PyAny>>,
         state: Option<Bound<'_, PyAny>>,
+        progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<u64> {
+        let py = slf.py();
         let simulation = slf.get();
         let until = simulation.end_cycle(until.map(|until| until.named("until")).transpose()?);
-        match decide {
-            None => simulation.advance_to_goal(slf.py(), Goal::Until(until)),
-            Some(decide) => run_with_policies(slf.py(), simulation, decide, state, until),
+        let reporter = ProgressReporter::from_argument(progress, "cycle")?;
+        let reported = reporter.as_ref();
+        let done = match decide {
+            None => simulation.advance_to_goal(py, Goal::Until(until), reported),
+            Some(decide) => run_with_policies(py, simulation, decide, state, until, reported),
+        };
+        if let Some(reporter) = &reporter {
+            reporter.close(py)?;
         }
+        done
     }
 
     /// The scenario.
@@ -804,7 +825,7 @@ impl PolicyRun for Simulation {
     }
 
     fn advance(&self, py: Python<'_>) -> PyResult<()> {
-        self.advance_to_goal(py, Goal::Further(1)).map(drop)
+        self.advance_to_goal(py, Goal::Further(1), None).map(drop)
     }
 }
 

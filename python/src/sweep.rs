@@ -6,7 +6,7 @@ use crate::json::{to_python, to_toml};
 use crate::result::{Fields, ResultClass};
 use crate::scenario::{Bundle, LoadedScenario, load};
 use crate::table::Table;
-use crate::watch::{SignalWatcher, run_polling};
+use crate::watch::{ProgressReporter, SignalWatcher, run_polling, run_reporting};
 use crate::worlds;
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
@@ -276,34 +276,22 @@ impl TrialExecutor for PyExecutor {
 
 /// Runs a sweep on threads, all processors if `workers` is 0, or by an executor: the native part of `sidestep.sweep`.
 #[pyfunction]
-#[pyo3(signature = (sweep, options, out, workers, begin))]
+#[pyo3(signature = (sweep, options, out, workers, begin, progress=None))]
 pub(crate) fn run_sweep<'py>(
     sweep: &Bound<'py, PyAny>,
     options: SweepOptions<'py>,
     out: Option<PathBuf>,
     workers: usize,
     begin: Option<Py<PyAny>>,
+    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = sweep.py();
-    let workers = if workers == 0 { available_workers() } else { workers };
-    let request = options.request(sweep)?;
-    let sweep = &request.sweep;
-    let out = out.as_ref();
-    let result = match begin {
-        None => run_polling(py, |watcher| run(sweep, out, Engine::Workers(workers), watcher))?,
-        Some(begin) => {
-            let signals = SignalWatcher::default();
-            let executor = PyExecutor { begin, parallelism: workers, raised: Mutex::default() };
-            let result = py.detach(|| run(sweep, out, Engine::Executor(&executor), &signals));
-            let raised = executor.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
-            raised.map_or(Ok(()), Err)?;
-            signals.into_result()?;
-            result
-        }
-    };
-    // A sweep without a result was interrupted by a signal, whose exception has been raised above.
-    let result = result.and_then(|result| result.ok_or(Error::Interrupted));
-    let result = result.map_err(|e| error::session_error(&e))?;
+    let reporter = ProgressReporter::from_argument(progress.as_ref(), "run")?;
+    let result = execute_sweep(sweep, &options, out.as_ref(), workers, begin, reporter.as_ref());
+    if let Some(reporter) = &reporter {
+        reporter.close(py)?;
+    }
+    let result = result?;
     let results = Table::from_runs("results", result.results, &result.world)?;
     let timings = Table::from_runs("timings", result.timings, &result.world)?;
     let series = Table::from_runs("series", result.series, &result.world)?;
@@ -314,6 +302,42 @@ pub(crate) fn run_sweep<'py>(
         .with("bands", bands_table(&result.bands)?)?
         .with("output", to_python(py, &result.summary)?)?
         .build(ResultClass("sidestep._sweep", "Sweep"))
+}
+
+/// Runs a sweep until it is done.
+///
+/// # Errors
+/// When an argument is wrong, a folder cannot be written or the executor fails; and the exception of a signal.
+fn execute_sweep(
+    sweep: &Bound<'_, PyAny>,
+    options: &SweepOptions<'_>,
+    out: Option<&PathBuf>,
+    workers: usize,
+    begin: Option<Py<PyAny>>,
+    reporter: Option<&ProgressReporter>,
+) -> PyResult<SweepResult> {
+    let py = sweep.py();
+    let workers = if workers == 0 { available_workers() } else { workers };
+    let request = options.request(sweep)?;
+    let sweep = &request.sweep;
+    let result = match begin {
+        None => {
+            let engine = Engine::Workers(workers);
+            run_reporting(py, reporter, |watcher| run(sweep, out, engine, watcher))?
+        }
+        Some(begin) => {
+            let signals = SignalWatcher::new(reporter);
+            let executor = PyExecutor { begin, parallelism: workers, raised: Mutex::default() };
+            let result = py.detach(|| run(sweep, out, Engine::Executor(&executor), &signals));
+            let raised = executor.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
+            raised.map_or(Ok(()), Err)?;
+            signals.into_result()?;
+            result
+        }
+    };
+    // A sweep without a result was interrupted by a signal, whose exception has been raised above.
+    let result = result.and_then(|result| result.ok_or(Error::Interrupted));
+    result.map_err(|e| error::session_error(&e))
 }
 
 /// Returns the means of metrics over time as a table, one row for each variant, metric and cycle.

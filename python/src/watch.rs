@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use sidestep::kernel::Interrupt;
-use sidestep_session::{Error, Watcher};
+use sidestep_session::{Error, Progress, Watcher};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -23,22 +23,74 @@ impl Watcher for TimeSlice {
     }
 }
 
-/// A watcher that stops work when Python has a signal to handle. Its user must hold no lock that a handler may need.
-#[derive(Debug, Default)]
-pub(crate) struct SignalWatcher(Mutex<Option<PyErr>>);
+/// A `sidestep._progress.Reporter`, which is called with the units that are done and with all.
+#[derive(Debug)]
+pub(crate) struct ProgressReporter(Py<PyAny>);
 
-impl SignalWatcher {
-    /// Returns the exception of the signal, if there was one.
-    pub(crate) fn into_result(self) -> PyResult<()> {
-        let raised = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
-        raised.map_or(Ok(()), Err)
+impl ProgressReporter {
+    /// Returns what an argument `progress` asks for; none for nothing.
+    ///
+    /// # Errors
+    /// When it is neither a function nor a truth value, or bars cannot be shown.
+    pub(crate) fn from_argument(
+        progress: Option<&Bound<'_, PyAny>>,
+        unit: &str,
+    ) -> PyResult<Option<Self>> {
+        let Some(progress) = progress else { return Ok(None) };
+        let module = progress.py().import("sidestep._progress")?;
+        let reporter = module.getattr("reporter")?.call1((progress, unit))?;
+        Ok((!reporter.is_none()).then(|| Self(reporter.unbind())))
+    }
+
+    pub(crate) fn report(&self, py: Python<'_>, done: u64, of: u64) -> PyResult<()> {
+        self.0.call1(py, (done, of)).map(drop)
+    }
+
+    /// Ends a bar.
+    pub(crate) fn close(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.call_method0(py, "close").map(drop)
     }
 }
 
-impl Watcher for SignalWatcher {
+/// A watcher that stops work when Python has a signal to handle. Its user must hold no lock that a handler may need.
+#[derive(Debug, Default)]
+pub(crate) struct SignalWatcher<'a> {
+    raised: Mutex<Option<PyErr>>,
+    reporter: Option<&'a ProgressReporter>,
+}
+
+impl<'a> SignalWatcher<'a> {
+    /// Creates one that also reports how many runs are done.
+    pub(crate) fn new(reporter: Option<&'a ProgressReporter>) -> Self {
+        Self { reporter, ..Self::default() }
+    }
+
+    /// Returns the exception of the signal, if there was one.
+    pub(crate) fn into_result(self) -> PyResult<()> {
+        let raised = self.raised.into_inner().unwrap_or_else(PoisonError::into_inner);
+        raised.map_or(Ok(()), Err)
+    }
+
+    fn report(&self, done: u64, of: u64) {
+        let Some(reporter) = self.reporter else { return };
+        // An exception of the function ends the work, like that of a signal.
+        let mut raised = self.raised.lock().unwrap_or_else(PoisonError::into_inner);
+        if raised.is_none() {
+            *raised = Python::attach(|py| reporter.report(py, done, of)).err();
+        }
+    }
+}
+
+impl Watcher for SignalWatcher<'_> {
+    fn on_progress(&self, progress: Progress<'_>) {
+        if let Progress::Runs { done, of, .. } = progress {
+            self.report(done, of);
+        }
+    }
+
     fn should_continue(&self) -> bool {
         // Python reports a signal once, so the exception is kept.
-        let mut raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut raised = self.raised.lock().unwrap_or_else(PoisonError::into_inner);
         if raised.is_none() {
             *raised = Python::attach(|py| py.check_signals()).err();
         }
@@ -58,13 +110,23 @@ impl Watcher for SignalWatcher {
 /// A watcher of work in other threads: Python handles signals on the main thread only, so the calling thread checks for
 /// them.
 #[derive(Debug, Default)]
-struct PolledWatcher {
-    signals: SignalWatcher,
+struct PolledWatcher<'a> {
+    signals: SignalWatcher<'a>,
+    /// Runs that are done and all, which the calling thread has not reported yet.
+    runs: Mutex<Option<(u64, u64)>>,
     is_over: AtomicBool,
     interrupt: Interrupt,
 }
 
-impl PolledWatcher {
+impl PolledWatcher<'_> {
+    /// Reports the progress since the last report.
+    fn report(&self) {
+        let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some((done, of)) = runs {
+            self.signals.report(done, of);
+        }
+    }
+
     /// Checks Python for signals; the first stops the work at once, even within a cycle: a half-done cycle is not
     /// kept.
     fn check_signals(&self) {
@@ -75,7 +137,13 @@ impl PolledWatcher {
     }
 }
 
-impl Watcher for PolledWatcher {
+impl Watcher for PolledWatcher<'_> {
+    fn on_progress(&self, progress: Progress<'_>) {
+        if let Progress::Runs { done, of, .. } = progress {
+            *self.runs.lock().unwrap_or_else(PoisonError::into_inner) = Some((done, of));
+        }
+    }
+
     fn should_continue(&self) -> bool {
         !self.is_over.load(Ordering::Relaxed)
     }
@@ -123,8 +191,25 @@ pub(crate) fn run_polling<T: Send>(
     py: Python<'_>,
     work: impl FnOnce(&dyn Watcher) -> T + Send,
 ) -> PyResult<T> {
-    let watcher = PolledWatcher::default();
-    let done =
-        py.detach(|| sidestep_session::run_polling(|| work(&watcher), || watcher.check_signals()));
+    run_reporting(py, None, work)
+}
+
+/// Does work in other threads, as [`run_polling`], and reports how many runs are done.
+///
+/// # Errors
+/// The exception of a signal, or of the function that is told.
+pub(crate) fn run_reporting<T: Send>(
+    py: Python<'_>,
+    reporter: Option<&ProgressReporter>,
+    work: impl FnOnce(&dyn Watcher) -> T + Send,
+) -> PyResult<T> {
+    let signals = SignalWatcher::new(reporter);
+    let watcher = PolledWatcher { signals, ..PolledWatcher::default() };
+    let poll = || {
+        watcher.report();
+        watcher.check_signals();
+    };
+    let done = py.detach(|| sidestep_session::run_polling(|| work(&watcher), poll));
+    watcher.report();
     watcher.signals.into_result().map(|()| done)
 }

@@ -11,7 +11,10 @@ import sidestep
 from sidestep import _native
 
 
-@pytest.mark.parametrize("page", ["README.md", "python/README.md", "docs/src/python.md", "docs/src/planners.md"])
+PAGES = ["README.md", "python/README.md", "docs/src/python.md", "docs/src/planners.md", "docs/src/tasks.md"]
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_the_code_of_a_page_runs_from_its_top_to_its_end(page, root, monkeypatch):
     monkeypatch.chdir(root)
     blocks = re.findall(r"^```python\n(.*?)^```", (root / page).read_text(), re.M | re.S)
@@ -93,7 +96,7 @@ def test_everything_is_documented_and_its_examples_run(root, monkeypatch):
 def test_every_function_and_method_has_an_example():
     """Attributes need none, and neither do functions that the package's own modules stand on."""
     own = {
-        "rebuild", "unpack_arm", "unpack_batch", "unpack_scenario", "unpack_space", "unpack_table", "unpack_team", "rows_by_name", "table_names", "run_sweep", "run_task", "compare_methods",
+        "rebuild", "unpack_arm", "unpack_batch", "unpack_learned", "unpack_scenario", "unpack_space", "unpack_table", "unpack_team", "rows_by_name", "table_names", "run_sweep", "run_task", "compare_methods",
         "learn_effector", "learn_sensor", "minimize_objective", "minimize_pairs", "Arm.forward", "Arm.inverse",
         "arm_trajectories",
     }  # fmt: skip
@@ -101,6 +104,7 @@ def test_every_function_and_method_has_an_example():
     elsewhere = {"Learned.profile", "sidestep.learn.Learned.profile", "Each.of_team", "Agent.decide"}
     own |= {name for name in vars(_native) if name.startswith("stats_")} | elsewhere
     own |= {"inspect", "read", "sweep_status", "write_clean"}
+    own |= {f"LogColumns.{name}" for name in vars(_native.LogColumns)}
     without = [
         name
         for name, thing, _ in documented()

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import sidestep
+from sidestep import learn
 from sidestep.envs import Env, VectorEnv, parallel_env
 
 FLOOR = {
@@ -130,6 +131,34 @@ def test_the_results_of_a_sweep_are_copied(copied: Callable[[Any], Any]) -> None
     again = copied(sweep)
     assert again.output == sweep.output
     assert equal(again.results, sweep.results) and equal(again.bands, sweep.bands)
+
+
+MOVES = {"action": ["forward"] * 40, "ahead_boxes": [1, 1, 1, 0] * 10, "left_boxes": [0] * 40, "turn_deg": [0] * 40}
+READINGS = {
+    "true": ["wall"] * 200,
+    "reported": ["wall"] * 190 + ["nothing"] * 10,
+    "true_distance_m": np.linspace(0.5, 5.0, 200),
+    "reported_distance_m": [*np.linspace(0.6, 4.9, 190), *[None] * 10],
+}
+
+
+@how
+def test_what_was_learned_is_copied(copied: Callable[[Any], Any]) -> None:
+    for learned in (learn.effector(MOVES), learn.sensor(READINGS, range_m=6.0, beam=True)):
+        again = copied(learned)
+        assert (again.kind, repr(again), str(again)) == (learned.kind, repr(learned), str(learned))
+        assert again.report == learned.report
+        other = learn.effector(MOVES).profile("other")
+        for text in (None, other):
+            assert again.profile("mine", text) == learned.profile("mine", text)
+
+
+def test_damaged_texts_of_what_was_learned_are_told() -> None:
+    maker, (kind, report, text, profile) = learn.effector(MOVES).__reduce__()  # type: ignore[misc]
+    wrong = [("wheel", report, profile), (kind, report[:-9], profile), (kind, report, profile[:99]), (kind, report, "")]
+    for kind, report, profile in wrong:
+        with pytest.raises(sidestep.InputError, match="unchanged"):
+            maker(kind, report, text, profile)
 
 
 @how

@@ -163,22 +163,36 @@ pub(crate) fn tests_by_parts<T>(
 ) -> Vec<HoldoutTest> {
     let robots: Vec<u32> = events.iter().map(robot_of).collect();
     let time: Vec<u32> = quarters(&robots).into_iter().map(|quarter| quarter as u32).collect();
-    let mut tests = Vec::new();
-    for (split, part_of) in [(Split::Time, time), (Split::Robot, robots)] {
+    let tables_of = |part_of: Vec<u32>| {
         let mut parts: BTreeMap<u32, Vec<&T>> = BTreeMap::new();
         for (event, part) in events.iter().zip(part_of) {
             parts.entry(part).or_default().push(event);
         }
         let tables = parts.iter().map(|(part, events)| (part.to_string(), count(events)));
-        let test = parts_test(&tables.collect::<Vec<_>>(), split, alpha);
-        tests.extend(test.filter(|test| test.degrees_of_freedom > 0));
-    }
-    tests
+        tables.collect::<Vec<_>>()
+    };
+    let parts = PartTables { time: tables_of(time), robots: tables_of(robots) };
+    tests_of_tables(&parts, alpha)
+}
+
+/// The tables of the parts of a log, with the names of the parts; parts without events are left out.
+pub(crate) struct PartTables {
+    /// Of each quarter of the time.
+    pub(crate) time: Vec<(String, CountTable)>,
+    /// Of each robot, by rising numbers.
+    pub(crate) robots: Vec<(String, CountTable)>,
+}
+
+/// Returns the tests of [`tests_by_parts`] for tables that were counted already.
+pub(crate) fn tests_of_tables(parts: &PartTables, alpha: f64) -> Vec<HoldoutTest> {
+    let time = parts_test(&parts.time, Split::Time, alpha);
+    let robots = parts_test(&parts.robots, Split::Robot, alpha);
+    time.into_iter().chain(robots).filter(|test| test.degrees_of_freedom > 0).collect()
 }
 
 /// Number of parts of a log that are compared to find errors that change in time: also a change that is undone before
 /// the end makes a quarter differ.
-const TIME_PARTS: usize = 4;
+pub(crate) const TIME_PARTS: usize = 4;
 /// A part with fewer events in a row is left out of its test: it would force all cells to be pooled.
 const MIN_PART_EVENTS: f64 = 20.0;
 /// Among more parts no odd ones are searched, because each is compared with all others again and again.
@@ -189,16 +203,69 @@ const ODD_P: f64 = 1e-4;
 /// Returns the quarter of its robot's events in which each event lies; `robots` has the robot of each event, in the
 /// order of time. Quarters of each robot by itself, so that robots that differ do not look like a change.
 fn quarters(robots: &[u32]) -> Vec<usize> {
-    let mut totals: BTreeMap<u32, usize> = BTreeMap::new();
-    robots.iter().for_each(|robot| *totals.entry(*robot).or_insert(0) += 1);
-    let mut seen: BTreeMap<u32, usize> = BTreeMap::new();
-    let mut quarters = Vec::with_capacity(robots.len());
-    for robot in robots {
-        let before = seen.entry(*robot).or_insert(0);
-        quarters.push(*before * TIME_PARTS / totals[robot]);
-        *before += 1;
+    let mut counter = PartCounter::default();
+    robots.iter().for_each(|robot| counter.count(*robot));
+    robots.iter().map(|robot| counter.next(*robot).quarter).collect()
+}
+
+/// The parts to which the events of a log belong, found in two passes over it: the first counts, the second asks.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct PartCounter {
+    /// The place of each robot in the lists below, by its number.
+    places: BTreeMap<u32, usize>,
+    /// Number of events of each robot.
+    totals: Vec<usize>,
+    /// Number of those that were asked for.
+    seen: Vec<usize>,
+    /// The robot of the last event and its place: most logs are of one robot, or have long runs of each.
+    last: Option<(u32, usize)>,
+}
+
+/// The parts to which an event belongs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct EventParts {
+    /// The quarter of the time of its robot, from 0.
+    pub(crate) quarter: usize,
+    /// The place of its robot among all robots.
+    pub(crate) robot: usize,
+}
+
+impl PartCounter {
+    /// Counts an event of this robot.
+    pub(crate) fn count(&mut self, robot: u32) {
+        let place = self.place(robot);
+        self.totals[place] += 1;
     }
-    quarters
+
+    /// Returns the parts of the next event, which is of this robot and was counted before.
+    pub(crate) fn next(&mut self, robot: u32) -> EventParts {
+        let place = self.place(robot);
+        let before = self.seen[place];
+        self.seen[place] += 1;
+        // Numbers that another thread has changed between the passes must not end the program.
+        let quarter = before * TIME_PARTS / self.totals[place].max(1);
+        EventParts { quarter: quarter.min(TIME_PARTS - 1), robot: place }
+    }
+
+    /// Returns the numbers of all robots with their places, rising.
+    pub(crate) fn robots(&self) -> impl Iterator<Item = (u32, usize)> {
+        self.places.iter().map(|(number, place)| (*number, *place))
+    }
+
+    fn place(&mut self, robot: u32) -> usize {
+        if let Some((last, place)) = self.last
+            && last == robot
+        {
+            return place;
+        }
+        let place = *self.places.entry(robot).or_insert(self.totals.len());
+        if place == self.totals.len() {
+            self.totals.push(0);
+            self.seen.push(0);
+        }
+        self.last = Some((robot, place));
+        place
+    }
 }
 
 /// Compares the parts of a log, each held out in turn; `parts` are tables of one shape with their names.

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::EstimateOptions;
-use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 
 /// Causes that have nothing to do with the result of a sample, so that the others are still a fair draw. Any other
@@ -74,14 +73,13 @@ impl LeftOut {
     }
 }
 
-/// Returns the number of rows with another number of fields that may be among those chosen: nothing tells of which robot,
-/// effector or sensor they are, so these have their share of them, rounded up.
-pub(crate) fn misfits_among(table: &CsvTable, chosen: usize) -> u64 {
-    let all = table.rows().count() as u64;
+/// Returns the number of `misfits`, rows with another number of fields, that may be among those chosen of `all` other
+/// rows: nothing tells of which robot, effector or sensor they are, so these have their share of them, rounded up.
+pub(crate) fn misfits_among(all: usize, misfits: usize, chosen: usize) -> u64 {
     if all == 0 {
-        return table.misfits().len() as u64;
+        return misfits as u64;
     }
-    (table.misfits().len() as u64 * chosen as u64).div_ceil(all)
+    (misfits as u64 * chosen as u64).div_ceil(all as u64)
 }
 
 /// Returns the warning on damaged rows of a table, with the error of the first of them.

@@ -5,10 +5,12 @@ pub mod effector;
 pub mod sensor;
 
 mod beam_information;
+pub mod columns;
 mod counts;
 mod display;
 pub mod holdout;
 mod left_out;
+pub mod log_table;
 pub mod profile;
 mod track;
 
@@ -20,7 +22,7 @@ pub use left_out::LeftOut;
 
 use serde::Serialize;
 
-use sidestep_import::table::CsvTable;
+use log_table::LogTable;
 use sidestep_import::{ImportReport, Treatment};
 use sidestep_kernel::InputError;
 
@@ -86,7 +88,7 @@ pub(crate) fn import_warnings(name: &str, report: &ImportReport) -> Vec<String> 
 }
 
 /// Returns what to say of a table that is learned from: how it was read, and which of its columns are not.
-pub(crate) fn table_warnings(table: &CsvTable, columns: &[&str]) -> Vec<String> {
+pub(crate) fn table_warnings(table: &dyn LogTable, columns: &[&str]) -> Vec<String> {
     let mut report = ImportReport::default();
     table.record_separators(&mut report);
     let mut warnings = import_warnings("the table", &report);

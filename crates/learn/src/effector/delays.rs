@@ -60,26 +60,27 @@ impl DelayReport {
 }
 
 /// Returns the pauses of each robot in the order of time.
-fn series_by_robot(pauses: &[Pause]) -> Vec<Vec<f64>> {
-    let mut series: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+fn series_by_robot(pauses: &[Pause]) -> Vec<Vec<u32>> {
+    let mut series: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for pause in pauses {
-        series.entry(pause.robot).or_default().push(f64::from(pause.cycles));
+        series.entry(pause.robot).or_default().push(pause.cycles);
     }
     series.into_values().collect()
 }
 
 /// Returns the correlation of consecutive pauses, by the mean and variance of all.
-fn autocorrelation(series: &[Vec<f64>]) -> Option<f64> {
+fn autocorrelation(series: &[Vec<u32>]) -> Option<f64> {
+    let all = || series.iter().flatten().map(|cycles| f64::from(*cycles));
     let n: usize = series.iter().map(Vec::len).sum();
-    let mean = series.iter().flatten().sum::<f64>() / n as f64;
-    let variance = series.iter().flatten().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n as f64;
-    let pairs: Vec<f64> = series
-        .iter()
-        .flat_map(|one| one.windows(2))
-        .map(|pair| (pair[0] - mean) * (pair[1] - mean))
-        .collect();
-    (variance > 0.0 && !pairs.is_empty())
-        .then(|| pairs.iter().sum::<f64>() / (pairs.len() as f64 * variance))
+    let mean = all().sum::<f64>() / n as f64;
+    let variance = all().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n as f64;
+    let off = |cycles: u32| f64::from(cycles) - mean;
+    let pairs = series.iter().flat_map(|one| one.windows(2));
+    let pair_count = n - series.len();
+    (variance > 0.0 && pair_count > 0).then(|| {
+        let products = pairs.map(|pair| off(pair[0]) * off(pair[1]));
+        products.sum::<f64>() / (pair_count as f64 * variance)
+    })
 }
 
 /// Returns how many actions were delayed, and for how long those were.

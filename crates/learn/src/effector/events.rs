@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use super::grid_displacement::{
-    FORWARD_CLASSES, forward_class, grid_displacements, phase_average, round_half_up,
+    FORWARD_CLASSES, GridDisplacement, OutcomeSums, PhaseShares, forward_class, round_half_up,
+    visit_outcomes,
 };
 use super::report::{EffectorReport, ForwardShares, TurnReport};
 use super::transitions::{
@@ -71,11 +72,58 @@ pub(super) fn nearest_turn(commanded_rad: f64, true_rad: f64) -> f64 {
     if error_rad.abs() <= PI + 1e-9 { true_rad } else { true_rad - TAU * error_rad.signum() }
 }
 
+/// Moves and turns that are visited in the order of time, again for each figure: a log of millions of rows makes them
+/// anew each time, which takes less than to keep them.
+pub(super) trait EventLog {
+    /// Returns the number of moves.
+    fn move_count(&self) -> usize;
+
+    /// Visits all moves.
+    fn visit_moves(&self, visit: &mut dyn FnMut(&MoveEvent));
+
+    /// Visits all turns.
+    fn visit_turns(&self, visit: &mut dyn FnMut(&TurnEvent));
+}
+
 /// All moves and turns of a robot's log.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Events {
     pub(super) moves: Vec<MoveEvent>,
     pub(super) turns: Vec<TurnEvent>,
+}
+
+impl EventLog for Events {
+    fn move_count(&self) -> usize {
+        self.moves.len()
+    }
+
+    fn visit_moves(&self, visit: &mut dyn FnMut(&MoveEvent)) {
+        self.moves.iter().for_each(visit);
+    }
+
+    fn visit_turns(&self, visit: &mut dyn FnMut(&TurnEvent)) {
+        self.turns.iter().for_each(visit);
+    }
+}
+
+/// Returns the parts of a report that say what moves and turns were, without tables of counts.
+pub(super) fn summary(
+    log: &dyn EventLog,
+    source: &str,
+    options: &EstimateOptions,
+) -> EffectorReport {
+    let moves = MoveCounts::new(log);
+    EffectorReport {
+        source: source.to_owned(),
+        events: moves.n as u64,
+        transitions_rounded: ForwardShares::from_counts(&moves.rounded_classes),
+        outcomes: moves.box_shares(),
+        rounded_counts: moves.rounded_boxes(),
+        moments: move_moments(log, &moves),
+        turns: turn_report(log),
+        estimate: *options,
+        ..EffectorReport::default()
+    }
 }
 
 impl Events {
@@ -86,22 +134,14 @@ impl Events {
         let turns = self.turn_counts();
         let tables = [&forward, &turns];
         EffectorReport {
-            source: source.to_owned(),
-            events: self.moves.len() as u64,
             transitions: ForwardShares::from_counts(forward.row(0)),
-            transitions_rounded: ForwardShares::from_counts(rounded_counts(&all).row(0)),
-            outcomes: box_shares(&all),
-            rounded_counts: rounded_box_counts(&all),
-            moments: self.moments(),
-            turns: self.turn_report(),
             probabilities: tables.iter().flat_map(|table| table.estimates()).collect(),
             thin: tables
                 .iter()
                 .flat_map(|table| table.low_count_rows(options.thin_below))
                 .collect(),
             hold_out: self.holdout_tests(options),
-            estimate: *options,
-            ..EffectorReport::default()
+            ..summary(self, source, options)
         }
     }
 
@@ -123,17 +163,6 @@ impl Events {
             assumed,
             rule: rule.to_owned(),
         }
-    }
-
-    fn moments(&self) -> BTreeMap<String, Moments> {
-        let moves = self.moves.iter();
-        let named = [
-            ("ahead_boxes", Moments::from_values(moves.clone().map(|m| m.ahead_boxes))),
-            ("left_boxes", Moments::from_values(moves.clone().map(|m| m.left_boxes))),
-            ("dtheta_minus_cmd_rad", Moments::from_values(moves.clone().map(|m| m.turn_error_rad))),
-            ("duration_s", Moments::from_values(moves.filter_map(|m| m.duration_s))),
-        ];
-        named.into_iter().filter_map(|(name, moments)| Some((name.to_string(), moments?))).collect()
     }
 
     fn holdout_tests(&self, options: &EstimateOptions) -> Vec<HoldoutTest> {
@@ -173,44 +202,120 @@ impl Events {
         assumed.push(format!("{action}: never fails"));
         transitions::certain_transition(intended_displacement(action))
     }
+}
 
-    fn turn_report(&self) -> Option<TurnReport> {
-        let turns = &self.turns;
-        if turns.is_empty() {
-            return None;
-        }
-        let n_left = turns.iter().filter(|turn| turn.is_left()).count();
-        Some(TurnReport {
-            n: turns.len(),
-            n_left,
-            n_right: turns.len() - n_left,
-            true_over_commanded: Moments::from_values(turns.iter().map(TurnEvent::ratio)),
-            error_deg_along_turn: Moments::from_values(turns.iter().map(TurnEvent::error_deg)),
-            duration_s: Moments::from_values(turns.iter().filter_map(|turn| turn.duration_s)),
-            hist_15deg: histogram(turns.iter().map(TurnEvent::along_deg), 15),
-            error_hist_5deg: histogram(turns.iter().map(TurnEvent::error_deg), 5),
-        })
+/// What one pass over all moves counts.
+struct MoveCounts {
+    n: usize,
+    /// Number of those with a duration.
+    timed: usize,
+    /// By [`FORWARD_CLASSES`], each move rounded to a box.
+    rounded_classes: [f64; 6],
+    boxes: OutcomeSums,
+    /// Phase-averaged shares of boxes.
+    shares: OutcomeSums,
+}
+
+impl MoveCounts {
+    fn new(log: &dyn EventLog) -> Self {
+        let mut counts = Self {
+            n: log.move_count(),
+            timed: 0,
+            rounded_classes: [0.0; 6],
+            boxes: OutcomeSums::new(),
+            shares: OutcomeSums::new(),
+        };
+        let n = counts.n as f64;
+        log.visit_moves(&mut |m| {
+            let ahead = round_half_up(m.ahead_boxes);
+            let left = round_half_up(m.left_boxes);
+            counts.timed += usize::from(m.duration_s.is_some());
+            counts.rounded_classes[forward_class(ahead, left)] += 1.0;
+            counts.boxes.add(GridDisplacement { ahead, left, quarters: 0 }, 1.0);
+            visit_outcomes([m.ahead_boxes, m.left_boxes, 0.0], &mut |outcome, weight| {
+                counts.shares.add(outcome, weight / n);
+            });
+        });
+        counts
     }
+
+    /// Returns the phase-averaged share of each box, by its name.
+    fn box_shares(&self) -> BTreeMap<String, f64> {
+        let boxes = self.shares.clone().into_sorted().into_iter();
+        boxes.map(|(outcome, share)| (box_name(outcome), share)).collect()
+    }
+
+    /// Returns the number of moves by the box to which they round, by its name.
+    fn rounded_boxes(&self) -> BTreeMap<String, u64> {
+        let boxes = self.boxes.clone().into_sorted().into_iter();
+        boxes.map(|(outcome, count)| (box_name(outcome), count as u64)).collect()
+    }
+}
+
+/// Returns the name of a box, `"ahead,left"`.
+fn box_name(outcome: GridDisplacement) -> String {
+    format!("{},{}", outcome.ahead, outcome.left)
+}
+
+/// Returns the moments of what moves are measured by, by name.
+fn move_moments(log: &dyn EventLog, counts: &MoveCounts) -> BTreeMap<String, Moments> {
+    // One after the other, because the values of each are sorted in a list of their own.
+    let of = |n: usize, value: fn(&MoveEvent) -> Option<f64>| {
+        let mut values = Vec::with_capacity(n);
+        if n > 0 {
+            log.visit_moves(&mut |m| values.extend(value(m)));
+        }
+        Moments::from_values(values)
+    };
+    let named = [
+        ("ahead_boxes", of(counts.n, |m| Some(m.ahead_boxes))),
+        ("left_boxes", of(counts.n, |m| Some(m.left_boxes))),
+        ("dtheta_minus_cmd_rad", of(counts.n, |m| Some(m.turn_error_rad))),
+        ("duration_s", of(counts.timed, |m| m.duration_s)),
+    ];
+    named.into_iter().filter_map(|(name, moments)| Some((name.to_string(), moments?))).collect()
+}
+
+fn turn_report(log: &dyn EventLog) -> Option<TurnReport> {
+    let (mut n, mut n_left, mut timed) = (0, 0, 0);
+    let mut along_15deg = Histogram::new(15);
+    let mut error_5deg = Histogram::new(5);
+    log.visit_turns(&mut |turn| {
+        n += 1;
+        n_left += usize::from(turn.is_left());
+        timed += usize::from(turn.duration_s.is_some());
+        along_15deg.add(turn.along_deg());
+        error_5deg.add(turn.error_deg());
+    });
+    if n == 0 {
+        return None;
+    }
+    let of = |n: usize, value: fn(&TurnEvent) -> Option<f64>| {
+        let mut values = Vec::with_capacity(n);
+        if n > 0 {
+            log.visit_turns(&mut |turn| values.extend(value(turn)));
+        }
+        Moments::from_values(values)
+    };
+    Some(TurnReport {
+        n,
+        n_left,
+        n_right: n - n_left,
+        true_over_commanded: of(n, |turn| Some(turn.ratio())),
+        error_deg_along_turn: of(n, |turn| Some(turn.error_deg())),
+        duration_s: of(timed, |turn| turn.duration_s),
+        hist_15deg: along_15deg.bins,
+        error_hist_5deg: error_5deg.bins,
+    })
 }
 
 /// Counts the phase-averaged classes of moves ahead.
 fn forward_counts(moves: &[&MoveEvent]) -> CountTable {
     let mut counts = empty_forward_counts();
-    for (outcome, weight) in
-        moves.iter().flat_map(|m| grid_displacements(m.ahead_boxes, m.left_boxes, 0.0))
-    {
-        counts.add(0, forward_class(outcome.ahead, outcome.left), weight);
-    }
-    counts
-}
-
-/// Counts the classes of moves ahead by rounding.
-fn rounded_counts(moves: &[&MoveEvent]) -> CountTable {
-    let mut counts = empty_forward_counts();
     for m in moves {
-        let ahead = round_half_up(m.ahead_boxes);
-        let left = round_half_up(m.left_boxes);
-        counts.add(0, forward_class(ahead, left), 1.0);
+        visit_outcomes([m.ahead_boxes, m.left_boxes, 0.0], &mut |outcome, weight| {
+            counts.add(0, forward_class(outcome.ahead, outcome.left), weight);
+        });
     }
     counts
 }
@@ -225,41 +330,28 @@ fn turn_counts<'t>(turns: impl Iterator<Item = &'t TurnEvent>) -> CountTable {
     let rows = ["left", "right"].map(String::from);
     let mut counts = CountTable::new("turns", &rows, &TURN_CLASSES.map(String::from));
     for turn in turns {
-        for (quarters, weight) in phase_average(turn.ratio()) {
+        for &(quarters, weight) in PhaseShares::new(turn.ratio()).as_slice() {
             counts.add(usize::from(!turn.is_left()), turn_class(quarters), weight);
         }
     }
     counts
 }
 
-/// Returns the phase-averaged share of each box, `"ahead,left"`.
-fn box_shares(moves: &[&MoveEvent]) -> BTreeMap<String, f64> {
-    let mut shares = BTreeMap::new();
-    for (outcome, weight) in
-        moves.iter().flat_map(|m| grid_displacements(m.ahead_boxes, m.left_boxes, 0.0))
-    {
-        let name = format!("{},{}", outcome.ahead, outcome.left);
-        *shares.entry(name).or_insert(0.0) += weight / moves.len() as f64;
-    }
-    shares
+/// The number of values by their nearest multiple of a width.
+struct Histogram {
+    width: i32,
+    bins: BTreeMap<i32, u64>,
 }
 
-fn rounded_box_counts(moves: &[&MoveEvent]) -> BTreeMap<String, u64> {
-    let mut counts = BTreeMap::new();
-    for m in moves {
-        let name = format!("{},{}", round_half_up(m.ahead_boxes), round_half_up(m.left_boxes));
-        *counts.entry(name).or_insert(0) += 1;
+impl Histogram {
+    fn new(width: i32) -> Self {
+        Self { width, bins: BTreeMap::new() }
     }
-    counts
-}
 
-/// Returns the number of values by their nearest multiple of `width`.
-fn histogram(values: impl Iterator<Item = f64>, width: i32) -> BTreeMap<i32, u64> {
-    let mut bins = BTreeMap::new();
-    for value in values {
-        *bins.entry(round_half_up(value / f64::from(width)) * width).or_insert(0) += 1;
+    fn add(&mut self, value: f64) {
+        let bin = round_half_up(value / f64::from(self.width)) * self.width;
+        *self.bins.entry(bin).or_insert(0) += 1;
     }
-    bins
 }
 
 #[cfg(test)]
@@ -303,13 +395,13 @@ mod tests {
         let left = profile.action("left").unwrap();
         assert_eq!((left.len(), left[0].p), (1, 1.0));
         assert_eq!(profile.assumed, ["left: never fails", "right: never fails"]);
-        assert_eq!(Events::default().turn_report(), None);
+        assert_eq!(turn_report(&Events::default()), None);
     }
 
     #[test]
     fn histograms_tell_degrees_along_the_turn() {
         let events = Events { moves: vec![], turns: vec![turn(0.9, -1.0), turn(1.0, 1.0)] };
-        let report = events.turn_report().unwrap();
+        let report = turn_report(&events).unwrap();
         assert_eq!((report.n_left, report.n_right), (1, 1));
         assert_eq!(report.hist_15deg, BTreeMap::from([(45, 2)]));
         assert_eq!(report.error_hist_5deg, BTreeMap::from([(-5, 1), (0, 1)]));

@@ -22,6 +22,7 @@ mod bag;
 mod carmen;
 mod csv;
 mod delays;
+mod displacements;
 mod events;
 pub mod grid_displacement;
 mod mrclam;
@@ -36,6 +37,7 @@ pub use transitions::{EffectorProfile, ProfileTransition};
 use std::path::Path;
 
 use super::EstimateOptions;
+use super::log_table::LogTable;
 use sidestep_import::bag::TopicSelection;
 use sidestep_import::carmen::CarmenMotion;
 use sidestep_import::table::CsvTable;
@@ -209,12 +211,12 @@ pub fn from_csv(file: &Path, options: &EffectorOptions) -> Result<LearnedEffecto
     learn_csv(&CsvTable::read_recording(file)?, options)
 }
 
-/// Learns from a CSV table that was already read, see [`from_csv`].
+/// Learns from a table that was already read, see [`from_csv`].
 ///
 /// # Errors
 /// Those of [`from_csv`] that do not concern the file.
 pub fn learn_csv(
-    table: &CsvTable,
+    table: &dyn LogTable,
     options: &EffectorOptions,
 ) -> Result<LearnedEffector, InputError> {
     options.check()?;
@@ -250,7 +252,7 @@ const NO_BOX: &str = "the table gives displacements in boxes and does not say ho
 /// # Errors
 /// Those of [`learn_csv`]; when [`EffectorOptions::box_m`] is another box than that of the run.
 pub fn learn_run(
-    table: &CsvTable,
+    table: &dyn LogTable,
     facts: &[(String, String)],
     options: &EffectorOptions,
 ) -> Result<LearnedEffector, InputError> {
@@ -260,7 +262,8 @@ pub fn learn_run(
         && (asked_m - recorded_m).abs() > 1e-9 * recorded_m
     {
         let cause = format!("the run was recorded with boxes of {recorded_m} m, not {asked_m} m");
-        return Err(InputError::new(table.place(), cause, "leave out --box"));
+        let remedy = format!("leave out {}", table.option_name("--box", "box_m"));
+        return Err(InputError::new(table.place(), cause, remedy));
     }
     let options = EffectorOptions { box_m: recorded_m.or(options.box_m), ..options.clone() };
     let mut model = learn_csv(table, &options)?;

@@ -63,6 +63,80 @@ pub fn with_effector(
     with_section(place, text, ["effectors", name], effector(model))
 }
 
+/// The name of what was learned in a profile of its own, see [`with_learned`].
+const LEARNED: &str = "learned";
+
+/// Returns a profile of the sensor alone, from which [`with_learned`] takes it.
+///
+/// # Errors
+/// None that a learned sensor has.
+pub fn of_sensor(model: &LearnedSensor) -> Result<String, InputError> {
+    with_sensor("profile", &empty(LEARNED), LEARNED, model)
+}
+
+/// Returns a profile of the effector alone, from which [`with_learned`] takes it.
+///
+/// # Errors
+/// None that a learned effector has.
+pub fn of_effector(model: &LearnedEffector) -> Result<String, InputError> {
+    with_effector("profile", &empty(LEARNED), LEARNED, model)
+}
+
+/// Returns the profile `text` with what was learned added, or replaced, as [`with_sensor`] and [`with_effector`] do;
+/// `learned` is the text that [`of_sensor`] or [`of_effector`] returned. What was learned can be kept as that text.
+///
+/// # Errors
+/// When `text` is not a profile or `name` is empty; when `learned` is not such a text.
+pub fn with_learned(
+    place: &str,
+    text: &str,
+    name: &str,
+    learned: &str,
+) -> Result<String, InputError> {
+    let document = parse("learned", learned)?;
+    let mut text = text.to_owned();
+    let mut is_empty = true;
+    for group in ["sensors", "effectors"] {
+        let sections = document.get(group).and_then(Item::as_table);
+        for (key, item) in sections.into_iter().flat_map(Table::iter) {
+            let (Some(suffix), Some(section)) = (key.strip_prefix(LEARNED), item.as_table()) else {
+                continue;
+            };
+            is_empty = false;
+            let own_name = if suffix.is_empty() { name.to_owned() } else { beam_name(name) };
+            text = with_section(place, &text, [group, &own_name], without_places(section))?;
+        }
+    }
+    if is_empty {
+        let cause = format!("there is no sensor and no effector `{LEARNED}`");
+        return Err(InputError::new("learned", cause, "give the text unchanged"));
+    }
+    Ok(text)
+}
+
+/// Returns the same table as one that was made here: the places of its parts in the text that they come from would mix
+/// them with others.
+fn without_places(table: &Table) -> Table {
+    let mut fresh = Table::new();
+    fresh.set_implicit(table.is_implicit());
+    for (key, item) in table {
+        let item = match item {
+            Item::Table(part) => Item::Table(without_places(part)),
+            Item::ArrayOfTables(parts) => {
+                Item::ArrayOfTables(parts.iter().map(without_places).collect())
+            }
+            Item::Value(part) => {
+                let mut part = part.clone();
+                part.decor_mut().clear();
+                Item::Value(part)
+            }
+            other => other.clone(),
+        };
+        fresh.insert(key, item);
+    }
+    fresh
+}
+
 /// Returns whether the profile `text` has a section `name` among the `group` "sensors" or "effectors".
 pub fn has_section(text: &str, group: &str, name: &str) -> bool {
     let Ok(document) = text.parse::<DocumentMut>() else { return false };

@@ -52,7 +52,7 @@ pub(super) fn learn(
     let n_skipped = judged.skipped.values().sum::<u64>();
     let against = MapComparison::from_ranges(judged.readings.iter().map(LabeledReading::ranges_m));
     let observations = OBSERVATIONS.map(String::from).to_vec();
-    let log_of = ReadingLog { observations, classes, readings: judged.readings, rule: RULE };
+    let log_of = ReadingLog { observations, classes, readings: &judged.readings, rule: RULE };
     let mut model = log_of.model(source, options);
     let report = &mut model.report;
     report.measurements = report.sightings + n_skipped;
@@ -66,7 +66,7 @@ pub(super) fn learn(
     report.against_map = Some(against);
     model.profile = with_walls_only(model.profile);
     let least_m = log.scans.first().map_or(0.0, |scan| f64::from(scan.range_min_m));
-    model.fit_beam(&log_of.readings, [least_m.max(0.0), options.range_m]);
+    model.fit_beam(&judged.readings, [least_m.max(0.0), options.range_m]);
     Ok(model)
 }
 

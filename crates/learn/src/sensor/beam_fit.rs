@@ -14,7 +14,7 @@ use std::array;
 use serde::Serialize;
 
 use super::beam_interval::{likelihood_interval, log_interval, logit_interval};
-use super::readings::LabeledReading;
+use super::readings::Readings;
 use crate::beam_information::{Information, Scores};
 use crate::counts::rounded;
 use sidestep_error_models::beam::{BeamModel, PartChances};
@@ -93,19 +93,10 @@ pub(super) type RangeLimits = [f64; 2];
 
 impl BeamFit {
     /// Fits the readings of a sensor that measures from `limits` first to last; `None` where they are too few.
-    pub(super) fn from_readings(readings: &[LabeledReading], limits: RangeLimits) -> Option<Self> {
-        let [least_m, range_m] = limits;
-        let can_be_fitted = |pair: &RangePair| {
-            let is_inside = |m: f64| (least_m..range_m).contains(&m);
-            pair.true_m.is_none_or(|m| m > least_m && m < range_m)
-                && pair.reported_m.is_none_or(is_inside)
-        };
-        let pairs = readings.iter().map(|reading| {
-            let (true_m, reported_m) = reading.ranges_m();
-            RangePair { true_m, reported_m, scan: reading.scan }
-        });
-        let all: Vec<RangePair> = pairs.filter(can_be_fitted).collect();
-        let pairs = thinned(&all);
+    pub(super) fn from_readings(readings: &dyn Readings, limits: RangeLimits) -> Option<Self> {
+        let mut total = 0;
+        visit_pairs(readings, limits, &mut |_| total += 1);
+        let pairs = thinned_pairs(readings, limits, total);
         if pairs.len() < MIN_READINGS {
             return None;
         }
@@ -123,7 +114,7 @@ impl BeamFit {
                 .map(|((name, value), interval)| BeamParameter { name, value, interval })
                 .collect(),
             fitted: pairs.len() as u64,
-            readings: all.len() as u64,
+            readings: total as u64,
             scans: scans.len() as u64,
             steps,
             has_converged,
@@ -162,18 +153,41 @@ impl BeamFit {
     }
 }
 
-/// Returns at most [`MAX_READINGS`] pairs, spread evenly over beams and time.
-fn thinned(all: &[RangePair]) -> Vec<RangePair> {
-    if all.len() <= MAX_READINGS {
-        return all.to_vec();
-    }
-    let share = MAX_READINGS as f64 / all.len() as f64;
+/// Visits the ranges that can be fitted.
+fn visit_pairs(
+    readings: &dyn Readings,
+    [least_m, range_m]: RangeLimits,
+    visit: &mut dyn FnMut(RangePair),
+) {
+    readings.visit(&mut |reading| {
+        let (true_m, reported_m) = reading.ranges_m();
+        let is_inside = |m: f64| (least_m..range_m).contains(&m);
+        if true_m.is_none_or(|m| m > least_m && m < range_m) && reported_m.is_none_or(is_inside) {
+            visit(RangePair { true_m, reported_m, scan: reading.scan });
+        }
+    });
+}
+
+/// Returns at most about [`MAX_READINGS`] of `total` pairs, spread evenly over beams and time.
+fn thinned_pairs(readings: &dyn Readings, limits: RangeLimits, total: usize) -> Vec<RangePair> {
+    let share = MAX_READINGS as f64 / total as f64;
     // Multiples of the golden ratio are spread evenly, and have no period in common with the number of beams.
     let is_kept = |index: usize| {
+        if total <= MAX_READINGS {
+            return true;
+        }
         let turned = (index as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         (turned >> 32) as f64 / 4_294_967_296.0 < share
     };
-    all.iter().enumerate().filter(|(index, _)| is_kept(*index)).map(|(_, pair)| *pair).collect()
+    let mut pairs = Vec::new();
+    let mut index = 0;
+    visit_pairs(readings, limits, &mut |pair| {
+        if is_kept(index) {
+            pairs.push(pair);
+        }
+        index += 1;
+    });
+    pairs
 }
 
 /// Ranges to which a model is fitted.

@@ -5,24 +5,27 @@ use std::collections::BTreeMap;
 use super::LearnedSensor;
 use super::camera::{NOTHING, NamedRow, SensorProfile, certain_row, distance_rows};
 use super::options::{BEYOND, DistanceClasses, SensorOptions, THREE_EDGES_M};
-use super::readings::{LabeledReading, ParsedReadings, read};
+use super::readings::{LabeledReading, ParsedReadings, ReadingRule, Readings, read};
 use super::report::{ErrorMoments, SensorReport};
-use crate::holdout::{HoldoutTest, holdout_test, split, tests_by_parts};
+use crate::holdout::{
+    HoldoutTest, PartCounter, PartTables, TIME_PARTS, holdout_test, tests_of_tables,
+};
 use crate::left_out::damage_warning;
+use crate::log_table::LogTable;
 use crate::{CountMatrix, CountTable, LeftOut};
-use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
 use sidestep_statistics::Moments;
 
 /// Learns the sensor; `classes` come from `options`.
 pub(super) fn learn(
-    table: &CsvTable,
+    table: &dyn LogTable,
     options: &SensorOptions,
     classes: &DistanceClasses,
 ) -> Result<LearnedSensor, InputError> {
-    let ParsedReadings { observations, readings, damaged, first_error } =
-        read(table, options.sensor.as_deref(), classes)?;
-    let log = ReadingLog { observations, classes, readings, rule: RULE };
+    let sensor = options.sensor.as_deref();
+    let rule = ReadingRule { sensor, classes, needs_scans: options.beam };
+    let ParsedReadings { observations, readings, damaged, first_error } = read(table, &rule)?;
+    let log = ReadingLog { observations, classes, readings: &readings, rule: RULE };
     let mut model = log.model(table.place(), options);
     model.report.warnings.extend(name_warnings(&log.observations));
     if let Some(error) = first_error {
@@ -34,7 +37,7 @@ pub(super) fn learn(
     }
     if options.beam {
         refuse_kinds_of_things(table, &log)?;
-        model.fit_beam(&log.readings, [0.0, options.range_m]);
+        model.fit_beam(&readings, [0.0, options.range_m]);
     }
     Ok(model)
 }
@@ -65,11 +68,11 @@ fn name_warnings(observations: &[String]) -> Vec<String> {
 }
 
 /// Refuses a table to which no beam model can be fitted.
-fn refuse_kinds_of_things(table: &CsvTable, log: &ReadingLog<'_>) -> Result<(), InputError> {
+fn refuse_kinds_of_things(table: &dyn LogTable, log: &ReadingLog<'_>) -> Result<(), InputError> {
     let cause = if log.observations.len() > 2 {
         let listed = log.observations.join(", ");
         format!("a beam model knows ranges only, and the table has the observations {listed}")
-    } else if log.readings.iter().all(|reading| reading.ranges_m() == (None, None)) {
+    } else if !log.has_ranges() {
         "a beam model needs ranges in meters".to_string()
     } else {
         return Ok(());
@@ -87,32 +90,181 @@ pub(super) struct ReadingLog<'a> {
     /// `nothing`, then the others by name.
     pub(super) observations: Vec<String>,
     pub(super) classes: &'a DistanceClasses,
-    pub(super) readings: Vec<LabeledReading>,
+    pub(super) readings: &'a dyn Readings,
     /// The rule in words, for the profile.
     pub(super) rule: &'static str,
+}
+
+/// Counts of some readings, row by row.
+#[derive(Debug, Clone)]
+struct PairCounts {
+    n: usize,
+    /// True against reported observations.
+    confusion: Vec<f64>,
+    /// True against reported classes of distance, of correct reports.
+    distance: Vec<f64>,
+}
+
+impl PairCounts {
+    fn new(log: &ReadingLog<'_>) -> Self {
+        let [observations, classes] = log.sizes();
+        Self {
+            n: 0,
+            confusion: vec![0.0; observations * observations],
+            distance: vec![0.0; classes * classes],
+        }
+    }
+
+    /// Adds a reading to tables of this many observations and classes.
+    fn add(&mut self, [observations, classes]: [usize; 2], reading: &LabeledReading) {
+        self.n += 1;
+        self.confusion[reading.truth * observations + reading.reported] += 1.0;
+        if let Some((truth, reported)) = reading.correct_distances() {
+            self.distance[truth.class * classes + reported.class] += 1.0;
+        }
+    }
+
+    /// Returns the counts of both; sums of whole numbers are exact in any order.
+    fn plus(&self, other: &Self) -> Self {
+        let sums = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect();
+        Self {
+            n: self.n + other.n,
+            confusion: sums(&self.confusion, &other.confusion),
+            distance: sums(&self.distance, &other.distance),
+        }
+    }
+}
+
+/// All counts of readings.
+struct ReadingCounts {
+    all: PairCounts,
+    learned: PairCounts,
+    held_out: PairCounts,
+    /// Of each quarter of the time.
+    quarters: Vec<PairCounts>,
+    /// Of each robot, by rising numbers.
+    robots: Vec<(u32, PairCounts)>,
+    /// The confusion of objects in each distance class; `nothing` has none.
+    by_class: Vec<CountTable>,
+    /// True against reported distance in three classes.
+    three_classes: CountTable,
+    /// The classes of reports where nothing was.
+    beyond: CountTable,
+    /// Number of readings with a true distance.
+    with_distance: usize,
+    /// Number of correct reports with both ranges in meters, by class of the true one.
+    ranges_by_class: Vec<usize>,
+}
+
+impl ReadingCounts {
+    fn new(log: &ReadingLog<'_>, hold_out_every: usize) -> Self {
+        let mut parts = PartCounter::default();
+        log.readings.visit(&mut |reading| parts.count(reading.robot));
+        let mut counts = Self::empty(log);
+        let sizes = log.sizes();
+        let three = DistanceClasses::three_classes();
+        let mut robots = vec![PairCounts::new(log); parts.robots().count()];
+        let mut n = 0;
+        log.readings.visit(&mut |reading| {
+            let is_held_out = n % hold_out_every == hold_out_every - 1;
+            n += 1;
+            let sample = if is_held_out { &mut counts.held_out } else { &mut counts.learned };
+            sample.add(sizes, reading);
+            let places = parts.next(reading.robot);
+            counts.quarters[places.quarter].add(sizes, reading);
+            robots[places.robot].add(sizes, reading);
+            counts.add_distances(log, &three, reading);
+        });
+        counts.robots =
+            parts.robots().map(|(number, place)| (number, robots[place].clone())).collect();
+        counts.all = counts.learned.plus(&counts.held_out);
+        counts
+    }
+
+    fn empty(log: &ReadingLog<'_>) -> Self {
+        let names = &log.classes.names;
+        let table_of_class = |class: &String| {
+            let name = format!("confusion_{class}");
+            CountTable::new(&name, &log.observations[1..], &log.observations)
+        };
+        let three = DistanceClasses::three_classes().names;
+        Self {
+            all: PairCounts::new(log),
+            learned: PairCounts::new(log),
+            held_out: PairCounts::new(log),
+            quarters: vec![PairCounts::new(log); TIME_PARTS],
+            robots: Vec::new(),
+            by_class: names.iter().map(table_of_class).collect(),
+            three_classes: CountTable::new("distance3", &three, &three),
+            beyond: CountTable::new(BEYOND, &[BEYOND.to_string()], names),
+            with_distance: 0,
+            ranges_by_class: vec![0; names.len()],
+        }
+    }
+
+    fn add_distances(
+        &mut self,
+        log: &ReadingLog<'_>,
+        three: &DistanceClasses,
+        reading: &LabeledReading,
+    ) {
+        if let Some(distance) = reading.true_at {
+            self.with_distance += 1;
+            self.by_class[distance.class].add(reading.truth - 1, reading.reported, 1.0);
+        }
+        if let Some(distance) = reading.reported_at
+            && reading.truth == 0
+        {
+            self.beyond.add(0, distance.class, 1.0);
+        }
+        if let Some((true_m, reported_m)) = reading.correct_ranges_m() {
+            self.three_classes.add(three.class_of(true_m), three.class_of(reported_m), 1.0);
+            self.ranges_by_class[log.classes.class_of(true_m)] += 1;
+        }
+    }
 }
 
 impl ReadingLog<'_> {
     /// Returns the sensor that the readings describe.
     pub(super) fn model(&self, source: &str, options: &SensorOptions) -> LearnedSensor {
-        LearnedSensor { report: self.report(source, options), profile: self.profile(options) }
+        let counts = ReadingCounts::new(self, options.estimate.hold_out_every);
+        LearnedSensor {
+            report: self.report(source, &counts, options),
+            profile: self.profile(&counts, options),
+        }
     }
 
-    fn report(&self, source: &str, options: &SensorOptions) -> SensorReport {
-        let n = self.readings.len() as u64;
-        let all: Vec<&LabeledReading> = self.readings.iter().collect();
-        let confusion = self.confusion(&all);
-        let distance = self.distance(&all);
-        let by_class = self.by_class();
+    /// Returns the numbers of observations and of distance classes.
+    fn sizes(&self) -> [usize; 2] {
+        [self.observations.len(), self.classes.len()]
+    }
+
+    /// Returns whether any reading has a range in meters.
+    fn has_ranges(&self) -> bool {
+        let mut has_any = false;
+        self.readings.visit(&mut |reading| has_any |= reading.ranges_m() != (None, None));
+        has_any
+    }
+
+    fn report(
+        &self,
+        source: &str,
+        counts: &ReadingCounts,
+        options: &SensorOptions,
+    ) -> SensorReport {
+        let n = counts.all.n as u64;
+        let confusion = self.confusion(&counts.all);
+        let distance = self.distance(&counts.all);
         let tables: Vec<&CountTable> =
-            [&confusion, &distance].into_iter().chain(&by_class).collect();
+            [&confusion, &distance].into_iter().chain(&counts.by_class).collect();
+        let correct: f64 = (0..self.observations.len()).map(|k| confusion.row(k)[k]).sum();
         SensorReport {
             source: source.to_owned(),
             measurements: n,
             sightings: n,
             skipped: 0,
             skipped_by_cause: BTreeMap::new(),
-            correct: all.iter().filter(|r| r.truth == r.reported).count() as u64,
+            correct: correct as u64,
             nearest_agrees: None,
             unknown_codes: BTreeMap::new(),
             kinds: None,
@@ -122,8 +274,8 @@ impl ReadingLog<'_> {
             distance_counts_robots: None,
             distance_counts_landmarks: None,
             distance3_edges_m: THREE_EDGES_M,
-            distance3_counts: self.three_classes(),
-            errors: self.errors(),
+            distance3_counts: three_classes(&counts.three_classes),
+            errors: self.errors(counts),
             per_observer: BTreeMap::new(),
             detection: None,
             against_map: None,
@@ -133,7 +285,7 @@ impl ReadingLog<'_> {
                 .iter()
                 .flat_map(|t| t.low_count_rows(options.estimate.thin_below))
                 .collect(),
-            hold_out: self.holdout_tests(options),
+            hold_out: self.holdout_tests(counts, options),
             estimate: options.estimate,
             warnings: Vec::new(),
             distance_counts: CountMatrix(distance.clone()),
@@ -141,95 +293,59 @@ impl ReadingLog<'_> {
         }
     }
 
-    fn confusion(&self, readings: &[&LabeledReading]) -> CountTable {
-        let mut counts = CountTable::new("confusion", &self.observations, &self.observations);
-        readings.iter().for_each(|r| counts.add(r.truth, r.reported, 1.0));
-        counts
+    fn confusion(&self, counts: &PairCounts) -> CountTable {
+        square_table("confusion", &self.observations, &counts.confusion)
     }
 
-    /// Counts the confusion of objects in each distance class; `nothing` has none.
-    fn by_class(&self) -> Vec<CountTable> {
-        let mut tables = Vec::new();
-        for class in &self.classes.names {
-            let name = format!("confusion_{class}");
-            tables.push(CountTable::new(&name, &self.observations[1..], &self.observations));
-        }
-        for reading in &self.readings {
-            if let Some(distance) = reading.true_at {
-                tables[distance.class].add(reading.truth - 1, reading.reported, 1.0);
-            }
-        }
-        tables
+    fn distance(&self, counts: &PairCounts) -> CountTable {
+        square_table("distance", &self.classes.names, &counts.distance)
     }
 
-    fn distance(&self, readings: &[&LabeledReading]) -> CountTable {
-        let names = &self.classes.names;
-        let mut counts = CountTable::new("distance", names, names);
-        for (truth, reported) in readings.iter().filter_map(|r| r.correct_distances()) {
-            counts.add(truth.class, reported.class, 1.0);
-        }
-        counts
-    }
-
-    fn three_classes(&self) -> Option<CountMatrix> {
-        let classes = DistanceClasses::three_classes();
-        let mut counts = CountTable::new("distance3", &classes.names, &classes.names);
-        for (truth_m, reported_m) in self.correct_ranges_m() {
-            counts.add(classes.class_of(truth_m), classes.class_of(reported_m), 1.0);
-        }
-        (counts.cells().iter().flatten().sum::<f64>() > 0.0).then_some(CountMatrix(counts))
-    }
-
-    fn correct_ranges_m(&self) -> impl Iterator<Item = (f64, f64)> {
-        let right = self.readings.iter().filter_map(LabeledReading::correct_distances);
-        right.filter_map(|(truth, reported)| Some((truth.range_m?, reported.range_m?)))
-    }
-
-    fn errors(&self) -> ErrorMoments {
-        let errors_m = self.correct_ranges_m().map(|(truth_m, reported_m)| reported_m - truth_m);
-        let classes = 0..self.classes.len();
+    fn errors(&self, counts: &ReadingCounts) -> ErrorMoments {
+        // One list after the other, because each is sorted and may have millions of values.
+        let mut all_m = Vec::with_capacity(counts.ranges_by_class.iter().sum());
+        self.visit_ranges(&mut |true_m, reported_m| all_m.push(reported_m - true_m));
+        let range_error_m = Moments::from_values(all_m);
+        let mut by_class_m: Vec<Vec<f64>> =
+            counts.ranges_by_class.iter().map(|n| Vec::with_capacity(*n)).collect();
+        self.visit_ranges(&mut |true_m, reported_m| {
+            by_class_m[self.classes.class_of(true_m)].push(reported_m - true_m);
+        });
         ErrorMoments {
-            range_error_m: Moments::from_values(errors_m),
-            range_error_by_true_class: classes.map(|class| self.errors_in_class(class)).collect(),
+            range_error_m,
+            range_error_by_true_class: by_class_m.into_iter().map(Moments::from_values).collect(),
             bearing_error_rad: None,
         }
     }
 
-    /// Returns the errors of ranges whose true value is in a class.
-    fn errors_in_class(&self, class: usize) -> Option<Moments> {
-        let ranges = self.correct_ranges_m();
-        let in_class = ranges.filter(|(truth_m, _)| self.classes.class_of(*truth_m) == class);
-        Moments::from_values(in_class.map(|(truth_m, reported_m)| reported_m - truth_m))
+    /// Visits true and reported range of all correct reports that have both in meters.
+    fn visit_ranges(&self, visit: &mut dyn FnMut(f64, f64)) {
+        self.readings.visit(&mut |reading| {
+            if let Some((true_m, reported_m)) = reading.correct_ranges_m() {
+                visit(true_m, reported_m);
+            }
+        });
     }
 
-    /// Counts the classes of reports where nothing was.
-    fn beyond(&self) -> CountTable {
-        let mut counts = CountTable::new(BEYOND, &[BEYOND.to_string()], &self.classes.names);
-        let spurious = self.readings.iter().filter(|r| r.truth == 0);
-        spurious.filter_map(|r| r.reported_at).for_each(|at| counts.add(0, at.class, 1.0));
-        counts
-    }
-
-    fn holdout_tests(&self, options: &SensorOptions) -> Vec<HoldoutTest> {
+    fn holdout_tests(&self, counts: &ReadingCounts, options: &SensorOptions) -> Vec<HoldoutTest> {
         let alpha = options.estimate.alpha;
-        let (train, held) = split(&self.readings, options.estimate.hold_out_every);
+        let ReadingCounts { learned, held_out, .. } = counts;
         let mut tests = vec![
-            holdout_test(&self.confusion(&train), &self.confusion(&held), alpha),
-            holdout_test(&self.distance(&train), &self.distance(&held), alpha),
+            holdout_test(&self.confusion(learned), &self.confusion(held_out), alpha),
+            holdout_test(&self.distance(learned), &self.distance(held_out), alpha),
         ];
-        let confusion = |readings: &[&LabeledReading]| self.confusion(readings);
-        tests.extend(tests_by_parts(&self.readings, |r| r.robot, confusion, alpha));
-        let distance = |readings: &[&LabeledReading]| self.distance(readings);
-        tests.extend(tests_by_parts(&self.readings, |r| r.robot, distance, alpha));
+        let confusions = part_tables(counts, |counts| self.confusion(counts));
+        tests.extend(tests_of_tables(&confusions, alpha));
+        let distances = part_tables(counts, |counts| self.distance(counts));
+        tests.extend(tests_of_tables(&distances, alpha));
         tests
     }
 
-    fn profile(&self, options: &SensorOptions) -> SensorProfile {
+    fn profile(&self, counts: &ReadingCounts, options: &SensorOptions) -> SensorProfile {
         let alpha = options.estimate.alpha;
         let mut assumed = Vec::new();
-        let all: Vec<&LabeledReading> = self.readings.iter().collect();
-        let confusion = self.confusion_rows(&self.confusion(&all), alpha, &mut assumed);
-        let distance = self.distance(&all);
+        let confusion = self.confusion_rows(&self.confusion(&counts.all), alpha, &mut assumed);
+        let distance = self.distance(&counts.all);
         SensorProfile {
             bearings_deg: options.bearings_deg.clone(),
             range_m: options.range_m,
@@ -237,9 +353,9 @@ impl ReadingLog<'_> {
             designates: self.unseen_kinds(),
             distance_edges_m: self.classes.edges_m.clone(),
             distance_classes: self.classes.names.clone(),
-            confusion_by_class: self.rows_by_class(&confusion, alpha),
+            confusion_by_class: self.rows_by_class(counts, &confusion, alpha),
             confusion,
-            distance_confusion: distance_rows(&distance, &self.beyond(), alpha, &mut assumed),
+            distance_confusion: distance_rows(&distance, &counts.beyond, alpha, &mut assumed),
             assumed,
             rule: self.rule.to_string(),
         }
@@ -275,12 +391,17 @@ impl ReadingLog<'_> {
 
     /// Returns the rows for each class; without counts in a class, that of all classes. `pooled`
     /// has them in the order of the observations. Empty where the file gives no distances.
-    fn rows_by_class(&self, pooled: &[NamedRow], alpha: f64) -> Vec<(String, Vec<NamedRow>)> {
-        if self.readings.iter().all(|reading| reading.true_at.is_none()) {
+    fn rows_by_class(
+        &self,
+        counts: &ReadingCounts,
+        pooled: &[NamedRow],
+        alpha: f64,
+    ) -> Vec<(String, Vec<NamedRow>)> {
+        if counts.with_distance == 0 {
             return Vec::new();
         }
         let mut by_class = Vec::new();
-        for (class, counts) in self.classes.names.iter().zip(self.by_class()) {
+        for (class, counts) in self.classes.names.iter().zip(&counts.by_class) {
             let mut rows = Vec::new();
             for (index, name) in counts.rows().iter().enumerate() {
                 rows.push(match counts.smoothed(index, alpha) {
@@ -295,9 +416,34 @@ impl ReadingLog<'_> {
     }
 }
 
+/// Returns a table with the same rows as columns from its cells, row by row.
+fn square_table(name: &str, rows: &[String], cells: &[f64]) -> CountTable {
+    let mut table = CountTable::new(name, rows, rows);
+    for (index, count) in cells.iter().enumerate() {
+        table.add(index / rows.len(), index % rows.len(), *count);
+    }
+    table
+}
+
+fn three_classes(counts: &CountTable) -> Option<CountMatrix> {
+    let total: f64 = counts.cells().iter().flatten().sum();
+    (total > 0.0).then(|| CountMatrix(counts.clone()))
+}
+
+/// Returns the tables of all parts that have readings.
+fn part_tables(counts: &ReadingCounts, table_of: impl Fn(&PairCounts) -> CountTable) -> PartTables {
+    let quarters = counts.quarters.iter().enumerate().filter(|(_, counts)| counts.n > 0);
+    let robots = counts.robots.iter();
+    PartTables {
+        time: quarters.map(|(k, counts)| (k.to_string(), table_of(counts))).collect(),
+        robots: robots.map(|(number, counts)| (number.to_string(), table_of(counts))).collect(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_import::table::CsvTable;
 
     fn learned(text: &str, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
         learn(&CsvTable::parse(&"f.csv", text)?, options, &options.check()?)

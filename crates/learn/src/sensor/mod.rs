@@ -38,6 +38,7 @@ pub use report::{ErrorMoments, MapComparison, SensorReport};
 
 use std::path::Path;
 
+use crate::log_table::LogTable;
 use sidestep_import::bag::TopicSelection;
 use sidestep_import::table::CsvTable;
 use sidestep_kernel::InputError;
@@ -53,7 +54,7 @@ pub struct LearnedSensor {
 
 impl LearnedSensor {
     /// Fits the beam model to readings of a sensor that measures from `limits_m` first to last.
-    fn fit_beam(&mut self, readings: &[readings::LabeledReading], limits_m: [f64; 2]) {
+    fn fit_beam(&mut self, readings: &dyn readings::Readings, limits_m: [f64; 2]) {
         let fit = BeamFit::from_readings(readings, limits_m);
         self.report.warnings.extend(fit.iter().flat_map(BeamFit::warnings));
         if fit.is_none() {
@@ -162,11 +163,14 @@ const COLUMNS: &[&str] = &[
     "robot",
 ];
 
-/// Learns from a CSV table that was already read, see [`from_csv`].
+/// Learns from a table that was already read, see [`from_csv`].
 ///
 /// # Errors
 /// When the table is damaged or `options` are not valid.
-pub fn learn_csv(table: &CsvTable, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
+pub fn learn_csv(
+    table: &dyn LogTable,
+    options: &SensorOptions,
+) -> Result<LearnedSensor, InputError> {
     let mut model = learn_known_csv(table, options)?;
     model.report.warnings.extend(crate::table_warnings(table, COLUMNS));
     if table.find("true_class").is_some() {
@@ -180,7 +184,10 @@ pub fn learn_csv(table: &CsvTable, options: &SensorOptions) -> Result<LearnedSen
 }
 
 /// Learns from a table with distance classes that are those of the options.
-fn learn_known_csv(table: &CsvTable, options: &SensorOptions) -> Result<LearnedSensor, InputError> {
+fn learn_known_csv(
+    table: &dyn LogTable,
+    options: &SensorOptions,
+) -> Result<LearnedSensor, InputError> {
     let classes = options.check()?;
     csv::learn(table, options, &classes).map(judged)
 }

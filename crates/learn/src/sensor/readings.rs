@@ -1,11 +1,13 @@
 //! Readings with known true values, from a CSV table.
 
-use std::collections::BTreeSet;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::camera::NOTHING;
 use super::options::{BEYOND, DistanceClasses};
+use crate::columns::{BLOCK_ROWS, NumberColumn, RobotColumn};
 use crate::left_out;
-use sidestep_import::table::{CsvRow, CsvTable, Token};
+use crate::log_table::{Cell, CellValue, LogRow, LogTable};
 use sidestep_kernel::InputError;
 
 /// Largest number of observations; a column with more is taken for a column of numbers.
@@ -34,6 +36,12 @@ impl LabeledReading {
         (self.truth == self.reported).then_some((self.true_at?, self.reported_at?))
     }
 
+    /// Returns true and reported range in meters of a correct report of something.
+    pub(super) fn correct_ranges_m(&self) -> Option<(f64, f64)> {
+        let (truth, reported) = self.correct_distances()?;
+        Some((truth.range_m?, reported.range_m?))
+    }
+
     /// Returns true and reported range in meters, where there was something.
     pub(super) fn ranges_m(&self) -> (Option<f64>, Option<f64>) {
         let true_m = self.true_at.and_then(|distance| distance.range_m);
@@ -50,68 +58,254 @@ pub(super) struct Distance {
     pub(super) range_m: Option<f64>,
 }
 
+/// Readings that are visited in the order of time, again for each figure: a table of millions of rows makes them anew
+/// each time, which takes less than to keep them.
+pub(super) trait Readings {
+    /// Visits all readings.
+    fn visit(&self, visit: &mut dyn FnMut(&LabeledReading));
+}
+
+impl Readings for Vec<LabeledReading> {
+    fn visit(&self, visit: &mut dyn FnMut(&LabeledReading)) {
+        self.iter().for_each(visit);
+    }
+}
+
+/// In place of an observation: the row is left out.
+const LEFT_OUT: u8 = u8::MAX;
+/// In place of a distance class: there is no distance.
+const NO_CLASS: u8 = u8::MAX;
+
+/// The readings of a table, whose ranges stay in its columns as far as these have numbers.
+pub(super) struct TableReadings<'t> {
+    /// The true observation of each row; [`LEFT_OUT`] where the row is.
+    truths: Vec<u8>,
+    /// The reported one.
+    reports: Vec<u8>,
+    robots: RobotColumn,
+    /// The scan of each row; empty where nobody asks for it.
+    scans: Vec<u32>,
+    /// The classes of true and reported distance; [`NO_CLASS`] where there is none.
+    classes: [Vec<u8>; 2],
+    /// True and reported range in meters; `None` where only classes are given.
+    ranges: Option<[NumberColumn<'t>; 2]>,
+}
+
+impl Readings for TableReadings<'_> {
+    fn visit(&self, visit: &mut dyn FnMut(&LabeledReading)) {
+        let mut ranges_m = [(); 2].map(|()| vec![f64::NAN; BLOCK_ROWS]);
+        for (index, truths) in self.truths.chunks(BLOCK_ROWS).enumerate() {
+            let first_row = index * BLOCK_ROWS;
+            for (column, into) in self.ranges.iter().flatten().zip(&mut ranges_m) {
+                column.read(first_row, &mut into[..truths.len()]);
+            }
+            for (offset, &truth) in truths.iter().enumerate() {
+                if truth == LEFT_OUT {
+                    continue;
+                }
+                let row = first_row + offset;
+                let at = |side: usize| self.distance(side, row, ranges_m[side][offset]);
+                visit(&LabeledReading {
+                    robot: self.robots.get(row),
+                    scan: self.scans.get(row).copied().unwrap_or(0),
+                    truth: usize::from(truth),
+                    reported: usize::from(self.reports[row]),
+                    true_at: at(0),
+                    reported_at: at(1),
+                });
+            }
+        }
+    }
+}
+
+impl<'t> TableReadings<'t> {
+    fn new(table: &'t dyn LogTable, columns: &ReadingColumns) -> Self {
+        let row_count = table.row_count();
+        let ranges =
+            [columns.true_at, columns.reported_at].map(|column| NumberColumn::new(table, column));
+        Self {
+            truths: Vec::with_capacity(row_count),
+            reports: Vec::with_capacity(row_count),
+            robots: RobotColumn::new(row_count),
+            scans: Vec::new(),
+            classes: [(); 2].map(|()| Vec::with_capacity(row_count)),
+            ranges: columns.in_meters.then_some(ranges),
+        }
+    }
+
+    /// Adds the reading of the next row; `None` where the row is left out.
+    fn push(&mut self, reading: Option<&LabeledReading>) {
+        self.truths.push(reading.map_or(LEFT_OUT, |one| one.truth as u8));
+        self.reports.push(reading.map_or(LEFT_OUT, |one| one.reported as u8));
+        self.robots.push(reading.map_or(0, |one| one.robot));
+        let distances = reading.map_or([None; 2], |one| [one.true_at, one.reported_at]);
+        for (classes, distance) in self.classes.iter_mut().zip(distances) {
+            classes.push(distance.map_or(NO_CLASS, |distance| distance.class as u8));
+        }
+        for (column, distance) in self.ranges.iter_mut().flatten().zip(distances) {
+            column.push(distance.and_then(|distance| distance.range_m).unwrap_or(f64::NAN));
+        }
+    }
+
+    fn distance(&self, side: usize, row: usize, range_m: f64) -> Option<Distance> {
+        let class = self.classes[side][row];
+        let range_m = self.ranges.is_some().then_some(range_m);
+        (class != NO_CLASS).then(|| Distance { class: usize::from(class), range_m })
+    }
+}
+
 /// The readings of a table as far as it can be read.
-pub(super) struct ParsedReadings {
+pub(super) struct ParsedReadings<'t> {
     /// `nothing` first and the others by name.
     pub(super) observations: Vec<String>,
     /// In the order of the table, which is that of time.
-    pub(super) readings: Vec<LabeledReading>,
+    pub(super) readings: TableReadings<'t>,
     /// Number of damaged rows, which are left out.
     pub(super) damaged: u64,
     /// The error of the first of them.
     pub(super) first_error: Option<InputError>,
 }
 
-/// Returns the readings of the sensor `wanted`.
-pub(super) fn read(
-    table: &CsvTable,
-    wanted: Option<&str>,
-    classes: &DistanceClasses,
-) -> Result<ParsedReadings, InputError> {
+/// How the readings of a table are read.
+#[derive(Clone, Copy)]
+pub(super) struct ReadingRule<'a> {
+    /// The sensor to learn, for a table with several.
+    pub(super) sensor: Option<&'a str>,
+    pub(super) classes: &'a DistanceClasses,
+    /// Whether somebody asks which readings are of one scan.
+    pub(super) needs_scans: bool,
+}
+
+/// Returns the readings of the wanted sensor.
+pub(super) fn read<'t>(
+    table: &'t dyn LogTable,
+    rule: &ReadingRule<'_>,
+) -> Result<ParsedReadings<'t>, InputError> {
     let columns = ReadingColumns::find(table)?;
-    let rows = rows_of_sensor(table, wanted)?;
-    let observations = observations(table.place(), &rows, &columns)?;
-    let parser = RowParser { place: table.place(), columns, observations, classes };
-    let mut readings = Vec::with_capacity(rows.len());
-    let misfits = left_out::misfits_among(table, rows.len());
+    let chosen = ChosenSensor::find(table, rule.sensor)?;
+    let observations = observations(table, &chosen, &columns)?;
+    let mut readings = TableReadings::new(table, &columns);
+    let parser = RowParser { columns, observations, classes: rule.classes };
+    let (misfit_count, mut first_error) = table.misfits();
+    let misfits = left_out::misfits_among(table.row_count(), misfit_count, chosen.count);
     let mut damaged = misfits;
-    let mut first_error = table.misfits().first().map(|misfit| table.misfit_error(*misfit));
-    let cycle = table.find("cycle");
-    let mut scan = 0;
-    let mut before = None;
-    for row in &rows {
-        // Rows of one robot and cycle are one scan; where no cycle is given, each row is one.
-        let here =
-            cycle.map(|column| (row.field(column).text, parser.robot(row).map(|word| word.text)));
-        scan += u32::from(here.is_none() || here != before);
-        before = here;
-        match parser.reading(row) {
-            Ok(reading) => readings.push(LabeledReading { scan, ..reading }),
-            Err(error) => {
-                damaged += 1;
-                first_error.get_or_insert(error);
-            }
+    let mut scans = ScanNumbers { cycle: table.find("cycle"), ..ScanNumbers::default() };
+    let cycle = scans.cycle.filter(|_| rule.needs_scans);
+    let all: Vec<usize> = parser.columns.all().chain(chosen.column).chain(cycle).collect();
+    table.visit_rows(&all, &mut |_, row| {
+        let is_chosen = chosen.has(row);
+        if rule.needs_scans {
+            readings.scans.push(if is_chosen { scans.next(&parser, row) } else { 0 });
         }
-    }
+        let read = if is_chosen { parser.reading(row).map(Some) } else { Ok(None) };
+        let reading = read.unwrap_or_else(|error| {
+            damaged += 1;
+            first_error.get_or_insert(error);
+            None
+        });
+        readings.push(reading.as_ref());
+        Ok(())
+    })?;
     match first_error {
-        Some(error) if 2 * damaged > rows.len() as u64 + misfits => Err(error),
+        Some(error) if 2 * damaged > chosen.count as u64 + misfits => Err(error),
         first_error => {
             Ok(ParsedReadings { observations: parser.observations, readings, damaged, first_error })
         }
     }
 }
 
+/// Numbers of scans: rows of one robot and cycle are one scan; where no cycle is given, each row is one.
+#[derive(Default)]
+struct ScanNumbers {
+    cycle: Option<usize>,
+    scan: u32,
+    /// Cycle and robot of the row before.
+    before: Option<[ScanKey; 2]>,
+}
+
+/// A cell by which scans are told apart.
+#[derive(PartialEq)]
+enum ScanKey {
+    Text(String),
+    Number(f64),
+}
+
+impl ScanKey {
+    fn is_of(&self, value: CellValue<'_>) -> bool {
+        match (self, value) {
+            (Self::Text(text), CellValue::Word(word)) => text == word,
+            (Self::Text(text), CellValue::Missing) => text.is_empty(),
+            (Self::Number(number), CellValue::Real(other) | CellValue::Whole(other)) => {
+                *number == other
+            }
+            _ => false,
+        }
+    }
+
+    fn new(value: CellValue<'_>) -> Self {
+        match value {
+            CellValue::Word(word) => Self::Text(word.to_owned()),
+            CellValue::Missing => Self::Text(String::new()),
+            CellValue::Real(number) | CellValue::Whole(number) => Self::Number(number),
+        }
+    }
+}
+
+impl ScanNumbers {
+    /// Returns the number of the scan of the next row.
+    fn next(&mut self, parser: &RowParser<'_>, row: &dyn LogRow) -> u32 {
+        let here = self.cycle.map(|cycle| {
+            let robot = parser.robot(row).map_or(CellValue::Missing, |cell| cell.value());
+            [row.value(cycle), robot]
+        });
+        let is_same = match (&self.before, here) {
+            (Some(before), Some(here)) => {
+                before.iter().zip(here).all(|(key, value)| key.is_of(value))
+            }
+            _ => false,
+        };
+        if !is_same {
+            self.scan += 1;
+            self.before = here.map(|values| values.map(ScanKey::new));
+        }
+        self.scan
+    }
+}
+
 /// Returns the name of the only sensor of a table, if there is only one that has a name.
-pub(super) fn only_sensor(table: &CsvTable) -> Option<String> {
+pub(super) fn only_sensor(table: &dyn LogTable) -> Option<String> {
     let column = sensor_column(table)?;
-    let names: BTreeSet<&str> = table.rows().map(|row| row.field(column).text).collect();
-    (names.len() == 1).then(|| names.into_iter().next().map(String::from))?
+    let counts = sensor_counts(table, Some(column)).ok()?;
+    (counts.len() == 1).then(|| counts.into_keys().next())?
 }
 
 /// Returns the column that tells sensors apart: by name, else by any word. A number is one on its own robot, so that
 /// the same number may be two sensors on two robots.
-fn sensor_column(table: &CsvTable) -> Option<usize> {
+fn sensor_column(table: &dyn LogTable) -> Option<usize> {
     table.find("sensor_name").or_else(|| table.find("sensor"))
+}
+
+/// Returns the number of rows by the name of their sensor; all are of one without a name where no column tells.
+fn sensor_counts(
+    table: &dyn LogTable,
+    column: Option<usize>,
+) -> Result<BTreeMap<String, usize>, InputError> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    let Some(column) = column else {
+        if table.row_count() > 0 {
+            counts.insert(String::new(), table.row_count());
+        }
+        return Ok(counts);
+    };
+    table.visit_rows(&[column], &mut |_, row| {
+        let name = Cell::new(row, column).text();
+        match counts.get_mut(name.as_ref()) {
+            Some(count) => *count += 1,
+            None => drop(counts.insert(name.into_owned(), 1)),
+        }
+        Ok(())
+    })?;
+    Ok(counts)
 }
 
 struct ReadingColumns {
@@ -125,7 +319,7 @@ struct ReadingColumns {
 }
 
 impl ReadingColumns {
-    fn find(table: &CsvTable) -> Result<Self, InputError> {
+    fn find(table: &dyn LogTable) -> Result<Self, InputError> {
         let in_meters = table.find("true_class").is_none();
         let [true_at, reported_at] = if in_meters {
             ["true_distance_m", "reported_distance_m"]
@@ -133,84 +327,108 @@ impl ReadingColumns {
             ["true_class", "reported_class"]
         };
         let [truth, reported, true_at, reported_at] =
-            table.columns(["true", "reported", true_at, reported_at])?;
+            table.require(["true", "reported", true_at, reported_at])?;
         let robot = table.find("robot");
         Ok(Self { truth, reported, true_at, reported_at, robot, in_meters })
     }
+
+    /// Returns all columns that a row is read by.
+    fn all(&self) -> impl Iterator<Item = usize> {
+        let needed = [self.truth, self.reported, self.true_at, self.reported_at];
+        needed.into_iter().chain(self.robot)
+    }
 }
 
-/// Where `wanted` is not given, the file must be of a single sensor.
-fn rows_of_sensor<'t>(
-    table: &'t CsvTable,
-    wanted: Option<&str>,
-) -> Result<Vec<CsvRow<'t>>, InputError> {
-    let column = sensor_column(table);
-    let names: BTreeSet<&str> = table.rows().map(|row| sensor_name(&row, column)).collect();
-    let listed = names.iter().copied().collect::<Vec<_>>().join(", ");
-    if wanted.is_none() && names.len() > 1 {
-        let cause = format!("the file has readings of several sensors: {listed}");
-        let first = names.first().copied().unwrap_or_default();
-        let remedy = format!("choose one of them, e.g. --sensor {first}");
-        return Err(InputError::new(table.place(), cause, remedy));
-    }
-    let rows: Vec<CsvRow> = table
-        .rows()
-        .filter(|row| wanted.is_none_or(|wanted| sensor_name(row, column) == wanted))
-        .collect();
-    if rows.is_empty() {
-        let cause = match wanted {
-            Some(wanted) => format!("no readings of the sensor `{wanted}`"),
-            None => "the file has no readings".to_string(),
+/// The rows of one sensor.
+struct ChosenSensor<'a> {
+    /// The sensor that was asked for, with the column that names it; where none was, all rows are of one.
+    wanted: Option<&'a str>,
+    column: Option<usize>,
+    /// Number of rows.
+    count: usize,
+}
+
+impl<'a> ChosenSensor<'a> {
+    /// Where `wanted` is not given, the table must be of a single sensor.
+    fn find(table: &dyn LogTable, wanted: Option<&'a str>) -> Result<Self, InputError> {
+        let column = sensor_column(table);
+        let counts = sensor_counts(table, column)?;
+        let listed = counts.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        if wanted.is_none() && counts.len() > 1 {
+            let cause = format!("the table has readings of several sensors: {listed}");
+            let first = counts.keys().next().map_or("", String::as_str);
+            let option = table.option("--sensor", "name", first);
+            let remedy = format!("choose one of them, e.g. {option}");
+            return Err(InputError::new(table.place(), cause, remedy));
+        }
+        let count = match wanted {
+            Some(wanted) => counts.get(wanted).copied().unwrap_or(0),
+            None => counts.values().sum(),
         };
-        let remedy = format!("sensors in the file: {listed}");
-        return Err(InputError::new(table.place(), cause, remedy));
+        if count == 0 {
+            let cause = match wanted {
+                Some(wanted) => format!("no readings of the sensor `{wanted}`"),
+                None => "the table has no readings".to_string(),
+            };
+            let remedy = format!("sensors in the table: {listed}");
+            return Err(InputError::new(table.place(), cause, remedy));
+        }
+        Ok(Self { wanted, column, count })
     }
-    Ok(rows)
+
+    fn has(&self, row: &dyn LogRow) -> bool {
+        let Some(wanted) = self.wanted else { return true };
+        let name = self.column.map_or(Cow::Borrowed(""), |column| Cell::new(row, column).text());
+        name == wanted
+    }
 }
 
-/// Returns the sensor of a row; without a column of sensors, all rows are of one that has no name.
-fn sensor_name<'t>(row: &CsvRow<'t>, column: Option<usize>) -> &'t str {
-    column.map_or("", |column| row.field(column).text)
-}
-
-/// Returns `nothing`, then every other observation of the file by name.
+/// Returns `nothing`, then every other observation of the table by name.
 fn observations(
-    place: &str,
-    rows: &[CsvRow<'_>],
+    table: &dyn LogTable,
+    chosen: &ChosenSensor<'_>,
     columns: &ReadingColumns,
 ) -> Result<Vec<String>, InputError> {
-    let words = rows.iter().flat_map(|row| [row.field(columns.truth), row.field(columns.reported)]);
-    let mut names = BTreeSet::new();
-    for word in words {
-        if word.text.is_empty() {
-            continue;
+    let mut names: BTreeSet<String> = BTreeSet::new();
+    let pair = [columns.truth, columns.reported];
+    let all: Vec<usize> = pair.into_iter().chain(chosen.column).collect();
+    table.visit_rows(&all, &mut |_, row| {
+        if !chosen.has(row) {
+            return Ok(());
         }
-        names.insert(word.text);
-        if names.len() >= MAX_OBSERVATIONS {
-            let cause = format!("{MAX_OBSERVATIONS} different observations or more");
-            return Err(word.error(&place, cause, "name kinds of things, not measurements"));
+        for column in pair {
+            let cell = Cell::new(row, column);
+            let word = cell.text();
+            if word.is_empty() || names.contains(word.as_ref()) {
+                continue;
+            }
+            names.insert(word.into_owned());
+            if names.len() >= MAX_OBSERVATIONS {
+                let cause = format!("{MAX_OBSERVATIONS} different observations or more");
+                return Err(cell.error(cause, "name kinds of things, not measurements"));
+            }
         }
-    }
-    let others = names.into_iter().filter(|name| *name != NOTHING);
-    Ok(std::iter::once(NOTHING).chain(others).map(String::from).collect())
+        Ok(())
+    })?;
+    names.remove(NOTHING);
+    Ok(std::iter::once(NOTHING.to_owned()).chain(names).collect())
 }
 
-/// Properties of a file with which each of its rows is read.
+/// Properties of a table with which each of its rows is read.
 struct RowParser<'a> {
-    place: &'a str,
     columns: ReadingColumns,
     observations: Vec<String>,
     classes: &'a DistanceClasses,
 }
 
 impl RowParser<'_> {
-    fn reading(&self, row: &CsvRow<'_>) -> Result<LabeledReading, InputError> {
-        let truth = self.observation(row.field(self.columns.truth))?;
-        let reported = self.observation(row.field(self.columns.reported))?;
-        let robot = self.robot(row).map_or(Ok(0), |word| word.integer(&self.place))?;
+    fn reading(&self, row: &dyn LogRow) -> Result<LabeledReading, InputError> {
+        let truth = self.observation(Cell::new(row, self.columns.truth))?;
+        let reported = self.observation(Cell::new(row, self.columns.reported))?;
+        let robot = self.robot(row).map_or(Ok(0), |cell| cell.integer())?;
         // A distance beside `nothing` is ignored, but it must still be a valid distance.
-        let true_at = self.distance(row.field(self.columns.true_at))?;
-        let reported_at = self.distance(row.field(self.columns.reported_at))?;
+        let true_at = self.distance(Cell::new(row, self.columns.true_at))?;
+        let reported_at = self.distance(Cell::new(row, self.columns.reported_at))?;
         Ok(LabeledReading {
             robot,
             scan: 0,
@@ -221,39 +439,41 @@ impl RowParser<'_> {
         })
     }
 
-    fn robot<'t>(&self, row: &CsvRow<'t>) -> Option<Token<'t>> {
-        self.columns.robot.map(|column| row.field(column))
+    fn robot<'r>(&self, row: &'r dyn LogRow) -> Option<Cell<'r>> {
+        self.columns.robot.map(|column| Cell::new(row, column))
     }
 
-    fn observation(&self, word: Token<'_>) -> Result<usize, InputError> {
-        self.observations.iter().position(|name| name == word.text).ok_or_else(|| {
+    fn observation(&self, cell: Cell<'_>) -> Result<usize, InputError> {
+        let word = cell.text();
+        self.observations.iter().position(|name| *name == word).ok_or_else(|| {
             let remedy = "give an observation; `nothing` where there is none";
-            word.error(&self.place, "the observation is empty".to_string(), remedy)
+            cell.error("the observation is empty".to_string(), remedy)
         })
     }
 
-    fn distance(&self, word: Token<'_>) -> Result<Option<Distance>, InputError> {
-        match word.text {
-            "" | BEYOND => Ok(None),
-            _ if self.columns.in_meters => self.range(word).map(Some),
-            _ => self.class(word).map(Some),
+    fn distance(&self, cell: Cell<'_>) -> Result<Option<Distance>, InputError> {
+        match cell.value() {
+            CellValue::Missing | CellValue::Word("" | BEYOND) => Ok(None),
+            _ if self.columns.in_meters => self.range(cell).map(Some),
+            _ => self.class(cell).map(Some),
         }
     }
 
-    fn range(&self, word: Token<'_>) -> Result<Distance, InputError> {
-        let range_m = word.number(&self.place)?;
+    fn range(&self, cell: Cell<'_>) -> Result<Distance, InputError> {
+        let range_m = cell.number()?;
         if range_m < 0.0 {
             let cause = format!("a distance of {range_m} m");
-            return Err(word.error(&self.place, cause, "give a distance of at least 0 m"));
+            return Err(cell.error(cause, "give a distance of at least 0 m"));
         }
         Ok(Distance { class: self.classes.class_of(range_m), range_m: Some(range_m) })
     }
 
-    fn class(&self, word: Token<'_>) -> Result<Distance, InputError> {
+    fn class(&self, cell: Cell<'_>) -> Result<Distance, InputError> {
         let names = &self.classes.names;
-        let class = names.iter().position(|name| name == word.text).ok_or_else(|| {
-            let cause = format!("`{}` is not a distance class", word.text);
-            word.error(&self.place, cause, &format!("use one of {}", names.join(", ")))
+        let text = cell.text();
+        let class = names.iter().position(|name| *name == text).ok_or_else(|| {
+            let cause = format!("`{text}` is not a distance class");
+            cell.error(cause, &format!("use one of {}", names.join(", ")))
         })?;
         Ok(Distance { class, range_m: None })
     }
@@ -262,6 +482,7 @@ impl RowParser<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_import::table::CsvTable;
 
     #[test]
     fn a_sensor_has_its_share_of_the_rows_whose_own_is_not_known() {
@@ -272,10 +493,11 @@ mod tests {
             "left\n".repeat(20)
         );
         let table = CsvTable::parse_recording(&"f.csv", &text).unwrap();
-        let rows = rows_of_sensor(&table, Some("right")).unwrap();
-        assert_eq!((rows.len(), left_out::misfits_among(&table, rows.len())), (10, 2));
+        let chosen = ChosenSensor::find(&table, Some("right")).unwrap();
+        assert_eq!((chosen.count, left_out::misfits_among(100, 20, chosen.count)), (10, 2));
         let classes = DistanceClasses::new(&[1.0], &["near".to_owned(), "far".to_owned()]).unwrap();
-        let parsed = read(&table, Some("right"), &classes).unwrap();
+        let rule = ReadingRule { sensor: Some("right"), classes: &classes, needs_scans: false };
+        let parsed = read(&table, &rule).unwrap();
         assert_eq!(parsed.damaged, 2);
     }
 }

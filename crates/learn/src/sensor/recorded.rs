@@ -4,7 +4,7 @@ use super::LearnedSensor;
 use super::options::SensorOptions;
 use super::readings::only_sensor;
 use crate::EstimateOptions;
-use sidestep_import::table::CsvTable;
+use crate::log_table::LogTable;
 use sidestep_kernel::InputError;
 
 /// Options of learning a sensor from a recorded run: the recording gives what is left out here.
@@ -85,7 +85,7 @@ fn pairs(list: &str) -> Vec<(String, String)> {
 /// Returns the table of a recorded run from which a sensor is learned: `ranges` where it measures them, else `readings`.
 /// `table` and `facts` are those of `readings`.
 pub fn recorded_table(
-    table: &CsvTable,
+    table: &dyn LogTable,
     facts: &[(String, String)],
     sensor: Option<&str>,
 ) -> &'static str {
@@ -101,13 +101,13 @@ pub fn recorded_table(
 /// # Errors
 /// Those of [`learn_csv`](super::learn_csv); when other edges or classes are given than those of the run.
 pub fn learn_run(
-    table: &CsvTable,
+    table: &dyn LogTable,
     facts: &[(String, String)],
     options: &RunSensorOptions,
 ) -> Result<LearnedSensor, InputError> {
     let name = options.sensor.clone().or_else(|| only_sensor(table));
     let shape = name.map(|name| RecordedShape::from_facts(&name, facts)).unwrap_or_default();
-    let full = full_options(table.place(), options, &shape)?;
+    let full = full_options(table, options, &shape)?;
     let mut model = if shape.distance_edges_m.is_some() {
         super::learn_known_csv(table, &full)?
     } else {
@@ -132,20 +132,21 @@ pub fn learn_run(
 
 /// Returns the options with what the recording knows of the sensor.
 fn full_options(
-    place: &str,
+    table: &dyn LogTable,
     options: &RunSensorOptions,
     shape: &RecordedShape,
 ) -> Result<SensorOptions, InputError> {
     let default = SensorOptions::default();
     refuse_other(
-        place,
-        "--edges",
+        table.place(),
+        table.option_name("--edges", "edges_m"),
         options.distance_edges_m.as_ref(),
         shape.distance_edges_m.as_ref(),
     )?;
     let own_classes = Some(&options.distance_classes).filter(|classes| !classes.is_empty());
     let classes = Some(&shape.distance_classes).filter(|classes| !classes.is_empty());
-    refuse_other(place, "--classes", own_classes, classes)?;
+    let name = table.option_name("--classes", "classes");
+    refuse_other(table.place(), name, own_classes, classes)?;
     let edges_m = options.distance_edges_m.clone().or_else(|| shape.distance_edges_m.clone());
     Ok(SensorOptions {
         estimate: options.estimate,
@@ -186,6 +187,7 @@ fn refuse_other<T: PartialEq + std::fmt::Debug>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sidestep_import::table::CsvTable;
 
     const ROWS: &str = "cycle,robot,sensor,true,true_class,reported,reported_class,sensor_name\n\
         0,0,1,wall,near,wall,near,skin\n0,1,1,wall,far,nothing,beyond,sonar\n\

@@ -152,7 +152,7 @@ def _run_method(task: Task, method: str, seeds: NDArray[np.int64], workers: int)
         now |= {**tracker.arrays, TIME_LEFT: left}
         done: NDArray[np.bool_] = np.zeros(len(seeds), bool)
         if design.is_done is not None:
-            done = design.is_done(now).reshape(len(seeds), agents).all(axis=1)
+            done = np.asarray(design.is_done(now).reshape(len(seeds), agents).all(axis=1))
         going = np.logical_and(going, ~np.logical_or(done, worlds.is_over))
         if not going.any():
             break

@@ -1,6 +1,7 @@
 //! Promise: a table of displacements gives its shares back, and says what in it is not one law.
 
 use super::*;
+use sidestep_import::table::CsvTable;
 
 const HEAD: &str = "action,ahead_boxes,left_boxes,turn_deg\n";
 

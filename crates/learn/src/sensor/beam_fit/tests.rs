@@ -1,7 +1,7 @@
 //! Promise: the parameters with which ranges were drawn come back within their intervals, which have their coverage.
 
 use super::*;
-use crate::sensor::readings::Distance;
+use crate::sensor::readings::{Distance, LabeledReading};
 use sidestep_error_models::beam::BEAMS_PER_DRAW;
 use sidestep_kernel::Seed;
 use sidestep_kernel::stream::{Purpose, Streams};
@@ -129,14 +129,21 @@ fn ranges_of_another_kind_are_warned_of_and_few_are_refused() {
     }
     let fit = BeamFit::from_readings(&biased, [0.0, RANGE_M]).unwrap();
     assert!(fit.warnings().iter().any(|words| words.contains("does not describe")), "{fit}");
-    assert_eq!(BeamFit::from_readings(&biased[..50], [0.0, RANGE_M]), None);
+    assert_eq!(BeamFit::from_readings(&biased[..50].to_vec(), [0.0, RANGE_M]), None);
 }
 
 #[test]
 fn very_many_readings_are_thinned_evenly() {
-    let pair = |k: u32| RangePair { true_m: None, reported_m: None, scan: k };
-    let all: Vec<RangePair> = (0..1_000_000).map(pair).collect();
-    let kept = thinned(&all);
+    let nothing = |k: u32| LabeledReading {
+        robot: 0,
+        scan: k,
+        truth: 0,
+        reported: 0,
+        true_at: None,
+        reported_at: None,
+    };
+    let all: Vec<LabeledReading> = (0..1_000_000).map(nothing).collect();
+    let kept = thinned_pairs(&all, [0.0, RANGE_M], all.len());
     assert!((90_000..=110_000).contains(&kept.len()), "{}", kept.len());
     let of_one_beam = kept.iter().filter(|pair| pair.scan % 360 == 7).count();
     assert!((200..360).contains(&of_one_beam), "{of_one_beam}");
