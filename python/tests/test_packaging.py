@@ -62,7 +62,7 @@ def recipe(root, yaml):
 
 def requirement(text):
     """Returns name and version of `minari[hdf5]>=0.5`."""
-    name, version = re.fullmatch(r"([A-Za-z0-9_-]+)(?:\[\w+\])?(.*)", text).groups()
+    name, version = re.fullmatch(r"([A-Za-z0-9_-]+)(?:\[[\w,]+\])?(.*)", text).groups()
     return name, version
 
 
@@ -293,7 +293,7 @@ def test_advice_names_the_versions_of_the_extras(sources, project):
     for path in sources:
         for line in path.read_text(encoding="utf-8").splitlines():
             if "pip install" in line:
-                named = re.findall(r"'([\w-]+)(?:\[\w+\])?(>=[\d.]+)'", line.partition("pip install")[2])
+                named = re.findall(r"'([\w-]+)(?:\[[\w,]+\])?(>=[\d.]+)'", line.partition("pip install")[2])
                 assert named, f"{path.name}: {line.strip()}"
                 advised |= dict(named)
     assert {"gymnasium", "pettingzoo", "matplotlib", "ray"} <= set(advised)

@@ -42,11 +42,15 @@ def greedy(observed, masks, batch):
 
 @pytest.mark.parametrize("name", TASKS)
 def test_gymnasium_makes_each_and_its_checker_passes(name):
-    env = gymnasium.make(f"sidestep.envs:sidestep/{name}", render_mode="rgb_array", width=64)
+    env = gymnasium.make(f"sidestep.envs:sidestep/{name}", render_mode="rgb_array", width=200)
     assert env.spec.id == f"sidestep/{name}"
     check_env(env.unwrapped, skip_render_check=True)
     env.reset(seed=1)
-    assert max(env.render().shape[:2]) == 64
+    image = env.render()
+    assert min(image.shape[:2]) > 50 and image.shape[2] == 3
+    # Bodies are drawn: some of it is neither white nor the gray of letters and walls.
+    colors = image.reshape(-1, 3).astype(int)
+    assert (np.ptp(colors, axis=1) > 40).sum() > 20, "bodies have colors"
 
 
 @pytest.mark.parametrize("name", TEAMS)

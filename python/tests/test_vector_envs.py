@@ -73,7 +73,8 @@ def test_it_passes_the_checker_of_vector_environments(external, copy):
         assert (rewards.shape, rewards.dtype) == ((4,), np.float64)
         for flags in (terminations, truncations):
             assert (flags.shape, flags.dtype) == ((4,), bool)
-        assert infos == {}
+        # Worlds that restart tell their seeds.
+        assert set(infos) <= {"seed", "_seed"}
     assert data_equivalence(first, env.reset(seed=4)[0])
     wrapped = gymnasium.wrappers.vector.RecordEpisodeStatistics(VectorEnv(one(external), 4, max_cycles=5))
     wrapped.reset(seed=1)
@@ -147,6 +148,21 @@ def test_worlds_of_many_agents_have_the_episodes_of_environments_alone(external,
                 expected[k], _ = env.reset()
 
 
+def test_the_agents_of_many_worlds_are_environments_of_one_policy(external):
+    rows, worlds = VectorEnv(external, 15, max_cycles=4), Batch(external, 3, max_cycles=4)
+    assert rows.num_envs == 15 and rows.action_space.shape == (15,)
+    seen, expected = rows.reset(seed=2)[0], worlds.reset(seed=2)[0]
+    for _ in range(6):
+        actions = rows.action_space.sample()
+        assert rows.observation_space.contains(seen)
+        for name, array in seen.items():
+            np.testing.assert_array_equal(array, expected[name].reshape(array.shape))
+        seen, rewards, terminated, truncated, _ = rows.step(actions)
+        expected, by_world, *_, ends, _ = worlds.step(actions.reshape(3, 5))
+        np.testing.assert_array_equal(rewards, by_world.ravel())
+        np.testing.assert_array_equal(truncated, np.repeat(ends, 5))
+
+
 def test_unknown_options_and_wrong_values_are_errors(external):
     with pytest.raises(TypeError, match="wokers"):
         Batch(external, 2, wokers=2)
@@ -162,7 +178,7 @@ def test_unknown_options_and_wrong_values_are_errors(external):
         (lambda: Batch(nobody, 2), "no agent of this scenario takes orders"),
         (lambda: Batch(several, 2), "2 teams take orders"),
         (lambda: Batch(several, 2, team="robots"), "no team `robots` takes orders"),
-        (lambda: VectorEnv(external, 2), "5 agents take orders"),
+        (lambda: VectorEnv(external, 2), "2 is no multiple of the 5 agents of a world\n  help: give 5, for example"),
         (lambda: Batch(external, 2).step(np.zeros((2, 5))), "call reset first"),
         (lambda: Batch(external, 2).reset(seed=[1]), "1 seeds for 2 worlds"),
     ]:

@@ -322,7 +322,7 @@ class VectorEnv(GymnasiumVectorEnv[Any, Any, Any]):
         ``seed`` is the seed of the first world, or a list with one for each world; the mask has one for each environment.
         """
         mask = (options or {}).get("reset_mask")
-        if mask is not None and np.shape(mask) == (self.num_envs,):
+        if mask is not None and np.shape(mask) == (self.num_envs,) and np.asarray(mask).dtype == bool:
             rows = np.asarray(mask).reshape(self.batch.num_worlds, -1)
             options = {**(options or {}), "reset_mask": rows.any(axis=1)}
         observed, infos = self.batch.reset(seed=seed, options=options)
