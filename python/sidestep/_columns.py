@@ -113,11 +113,14 @@ def _add_array(columns: LogColumns, name: str, array: _Array) -> None:
             array = array.astype(np.float64)
         elif not array.dtype.isnative:
             array = array.astype(array.dtype.newbyteorder("="))
+        elif not array.flags.aligned or (array.strides and array.strides[0] % array.dtype.itemsize):
+            # A field of a packed record lies between the places of its type.
+            array = np.array(array)
         columns.add_numbers(name, array, (None, 0))
     elif kind == "b":
         _add_codes(columns, name, array.view(np.uint8), ["no", "yes"], (None, 0))
     elif kind == "U" and array.dtype.isnative and array.dtype.itemsize:
-        characters = np.ascontiguousarray(array).view(np.uint32).reshape(len(array), -1)
+        characters = np.ascontiguousarray(array).view(np.uint32).reshape(len(array), array.dtype.itemsize // 4)
         columns.add_characters(name, characters)
     else:
         columns.add_objects(name, array.astype(object))

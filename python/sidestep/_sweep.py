@@ -231,7 +231,8 @@ def _is_task(scenario: object) -> bool:
     """Returns whether it is a task, or the name of one; nothing is imported for what is none."""
     if isinstance(scenario, str):
         return scenario.startswith("sidestep/") and not os.path.exists(scenario)
-    return type(scenario).__module__.startswith("sidestep.envs.tasks")
+    kinds = {f"{kind.__module__}.{kind.__name__}" for kind in type(scenario).__mro__}
+    return "sidestep.envs.tasks._task.Task" in kinds
 
 
 def _mapping(name: str, values: Mapping[str, Any] | None) -> Mapping[str, Any]:

@@ -37,6 +37,8 @@ def to_minari(
     others have the lowest value in the action. ``options`` are those of Minari's ``create_dataset_from_buffers``, such as
     ``author`` and ``code_permalink``.
 
+    An episode that a task ended before the world was over, such as one whose targets were all visited, is cut here: truncated.
+
     Of a task, Minari's own ``DataCollector(tasks.make(...))`` makes data sets with the task's observations.
 
     Raises InputError when a folder has no run, or no orders, or the runs are of different scenarios.

@@ -241,3 +241,16 @@ def test_a_table_without_rows_and_types_that_are_neither_numbers_nor_words_are_t
     with pytest.raises(sidestep.InputError, match="more than one column `action`"):
         pandas = pytest.importorskip("pandas")
         learn.effector(pandas.DataFrame([["forward", "left"]], columns=["action", "action"]))
+
+
+def test_fields_of_packed_records_and_empty_columns_are_read_as_they_are() -> None:
+    plain = moves()
+    turns = np.array(plain["turn_deg"])
+    packed = np.zeros(ROWS, [("pad", "i1"), ("turn_deg", "f8")])
+    packed["turn_deg"] = turns
+    assert not packed["turn_deg"].flags.aligned
+    expected = learn.effector({**plain, "turn_deg": turns}).report
+    assert learn.effector({**plain, "turn_deg": packed["turn_deg"]}).report == expected
+    empty = {name: np.array([], "U7" if name == "action" else float) for name in ("action", "ahead_boxes", "left_boxes")}
+    with pytest.raises(sidestep.InputError):
+        learn.effector({**empty, "turn_deg": np.array([])})

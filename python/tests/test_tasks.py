@@ -300,6 +300,14 @@ def test_wrong_input_names_the_argument():
         batch.step(np.zeros(3, int))
     with pytest.raises(sidestep.InputError, match="one is no choice\n  help: give whole numbers from 0 to 3"):
         batch.step(np.full((1, 10), 4))
+    with pytest.raises(sidestep.InputError, match="give whole numbers from 0 to 3 and 0 to 3"):
+        radio = tasks.batch_env("RadioHall-v0", 1)
+        radio.reset(seed=1)
+        radio.step(np.full((1, 12, 2), 7))
+    with pytest.raises(sidestep.InputError, match="one is no choice"):
+        env.step(dict.fromkeys(env.agents, 1.9))
+    with pytest.raises(sidestep.InputError, match="action_masks: no episode is in progress"):
+        tasks.make("Exploration-v0").action_masks()
     with pytest.raises(sidestep.InputError, match="one is not a finite number"):
         arm = tasks.batch_env("RailArm-v0", 1)
         arm.reset(seed=1)
@@ -327,6 +335,86 @@ def test_arrays_are_handed_to_others_without_a_copy():
     observed, _ = batch.reset(seed=1)
     shared = np.from_dlpack(observed)
     assert np.shares_memory(shared, observed)
+
+
+def test_each_arrival_is_rewarded_also_where_the_next_goal_is_near():
+    for name in ("CorridorCounterflow-v0", "OfficeDeliveries-v0"):
+        batch = tasks.batch_env(name, 2, keys={"robots.0.count": 1}, max_cycles=400)
+        observed, infos = batch.reset(seed=4)
+        goals = np.zeros(2)
+        for _ in range(400):
+            rows = observed.reshape(-1, observed.shape[2])
+            observed, _, _, _, infos = batch.step(greedy(rows, None, batch).reshape(batch._shape))
+            goals += batch.reward_parts()["goal"].sum(axis=1)
+        trips = np.array([one["trips"] for one in infos["metrics"]])
+        assert (trips > 2).all()
+        # To a goal and back is a trip of a shuttle, and of a task with two errands.
+        assert set((goals - 2 * trips).tolist()) <= {0.0, 1.0, 2.0}, name
+
+
+def test_the_middle_of_the_corridor_is_as_far_from_both_walls():
+    from sidestep.envs.tasks.chain import LINE_STEP_M, middle_line
+
+    legs = [{"straight_m": 2.0}, {"radius_m": 1.5, "turn_deg": 90}, {"straight_m": 1.0}, {"radius_m": 1.5, "turn_deg": -180}]
+    line = middle_line({"legs": legs})
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    np.testing.assert_allclose(steps, LINE_STEP_M, rtol=2e-3)
+    length = 2.0 + 1.5 * np.pi / 2 + 1.0 + 1.5 * np.pi
+    assert len(line) == int(length / LINE_STEP_M) + 1
+    # Two to the east, around to the north, one on, and around to the right: there it heads south.
+    np.testing.assert_allclose(line[-1], [6.5, 2.5], atol=LINE_STEP_M)
+
+
+def test_fewer_robots_or_connectors_leave_places_empty():
+    for keys in ({"robots.0.count": 3}, {"robots.0.count": 1}):
+        batch = tasks.batch_env("RadioHall-v0", 1, keys=keys)
+        observed, _ = batch.reset(seed=1)
+        assert observed.shape == (1, keys["robots.0.count"], tasks.batch_env("RadioHall-v0", 1).encoder.size)
+        batch.step(batch.action_space.sample())
+    short = tasks.make("WindingCorridor-v0", keys={"chains.0.connectors": 2})
+    assert short.observation_space.contains(short.reset(seed=1)[0])
+    own = tasks.make("ReachInClutter-v0", keys={"chains.0.tasks.0.targets_m": [[1.0, 1.0], [0.0, 1.5]]})
+    own.reset(seed=1)
+    assert own.batch._now_arrays["target_m"].tolist() == [[1.0, 1.0]]
+
+
+def test_parts_of_rewards_are_those_of_the_last_rewards_also_at_restarts():
+    for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
+        batch = tasks.batch_env("CorridorCounterflow-v0", 2, max_cycles=3, autoreset_mode=mode)
+        batch.reset(seed=1)
+        batch.action_space.seed(1)
+        for _ in range(8):
+            _, rewards, *_ = batch.step(batch.action_space.sample())
+            np.testing.assert_allclose(sum(batch.reward_parts().values()), rewards)
+
+
+def test_a_contact_that_still_stands_is_not_counted_again():
+    batch = tasks.batch_env("RadioHall-v0", 2, keys={"robots.0.period": 3}, rewards={"contact": 1.0})
+    batch.reset(seed=2)
+    batch.action_space.seed(2)
+    total, ended = np.zeros(2), False
+    while not ended:
+        _, rewards, _, truncated, infos = batch.step(batch.action_space.sample())
+        total += rewards.sum(axis=1)
+        ended = truncated.all()
+    assert total.tolist() == [one["contacts"] for one in infos["metrics"]]
+
+
+def test_agents_that_come_later_or_leave_early_have_whole_episodes():
+    plane = {"at_m": [-2000.0, 0.0], "heading_deg": 0.0, "way_points_m": [[2000.0, 0.0]]}
+    later = {**plane, "at_m": [-2000.0, 3000.0], "way_points_m": [[2000.0, 3000.0]], "appears_s": 300.0}
+    keys = {"airspace.generator": None, "airplanes": [plane, later]}
+    env = tasks.parallel_env("MixedSpeeds-v0", keys=keys, max_cycles=40)
+    env.reset(seed=1)
+    seen, ends = set(), {}
+    while env.agents:
+        seen |= set(env.agents)
+        _, _, terminated, truncated, _ = env.step(dict.fromkeys(env.agents, 14))
+        ends |= {agent: (terminated[agent], truncated[agent]) for agent in terminated}
+    assert seen <= {"airplane_0", "airplane_1"} and ends["airplane_0"] == (True, False)
+    alone = tasks.parallel_env("MixedSpeeds-v0", keys={**keys, "airplanes": [later]})
+    _, infos = alone.reset(seed=5)
+    assert alone.agents == ["airplane_0"] and infos["airplane_0"]["seed"] == 5
 
 
 # Scores, and boards of them.
@@ -389,6 +477,11 @@ def test_a_leaderboard_is_written_read_and_replayed(tmp_path, command):
         assert digest in done.stdout + done.stderr
     with pytest.raises(sidestep.InputError, match="exists already"):
         tasks.write_leaderboard(tmp_path / "board", task, {"targets": "targets"}, runs=1)
+    with pytest.raises(sidestep.InputError, match="entries: `../out` is no name of a folder"):
+        tasks.write_leaderboard(tmp_path / "other", task, {"../out": "targets"}, runs=1)
+    with pytest.raises(sidestep.InputError, match="files: .*nothing.pt is not there"):
+        tasks.write_leaderboard(tmp_path / "other", task, {"targets": "targets"}, runs=1, files=[tmp_path / "nothing.pt"])
+    assert not list(tmp_path.glob("*other*")), "nothing is left of a board that was refused"
     with pytest.raises(sidestep.InputError, match="is no leaderboard"):
         tasks.Leaderboard.read(tmp_path)
 
@@ -406,6 +499,7 @@ def test_stable_baselines_learns_on_it():
     assert ended.all() and infos[0]["TimeLimit.truncated"]
     assert not np.array_equal(infos[0]["terminal_observation"], observed[0])
     assert env.env_method("action_masks", indices=[1])[0].dtype == bool
+    assert env.has_attr("action_masks"), "by this name sb3-contrib asks for masks"
     sb3.PPO("MlpPolicy", env, n_steps=16, batch_size=64, n_epochs=1, device="cpu").learn(320)
 
 

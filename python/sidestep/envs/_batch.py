@@ -138,8 +138,8 @@ class Batch:
 
         Returns the observations, rewards (worlds, agents), terminations and truncations (worlds,), and infos. A world
         restarts after its episode according to ``autoreset_mode``: in the next step, in which its action is ignored
-        and its rewards are 0; or in the same step, in which ``infos["final_obs"]`` has the final observations of the
-        worlds with a true ``infos["_final_obs"]``.
+        and its rewards are 0; or in the same step, in which ``infos["final_obs"]`` and ``infos["final_info"]`` have the final
+        observations and infos of the worlds with a true ``infos["_final_obs"]``.
         """
         if not self._rngs:
             raise input_error("step", "no episode is in progress", "call reset first")
@@ -158,6 +158,7 @@ class Batch:
         self._on_step(continuing)
         rewards = self._compute_rewards()
         rewards[restarting] = 0.0
+        self._drop_rewards(restarting)
         if restarting.any():
             self._on_restart(restarting)
         terminations = self._is_over() & continuing
@@ -167,7 +168,8 @@ class Batch:
         restarted = restarting
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
             ended = restarted = self._ended
-            infos |= {"final_obs": self._observed(copy=True), "_final_obs": ended.copy()}
+            last = {"final_info": dict(infos), "_final_info": ended.copy()}
+            infos |= {"final_obs": self._observed(copy=True), "_final_obs": ended.copy(), **last}
             self._restart(ended)
             # Into the same buffer: the arrays of the previous step still belong to the caller.
             self.worlds.observe(self._number, out=self._raw[self._now])
@@ -190,6 +192,9 @@ class Batch:
 
     def _on_step(self, mask: NDArray[np.bool_]) -> None:
         """Is called when worlds have done a cycle and are observed."""
+
+    def _drop_rewards(self, mask: NDArray[np.bool_]) -> None:
+        """Is called with the worlds whose rewards are none, since they have restarted."""
 
     def _is_over(self) -> NDArray[np.bool_]:
         """Returns whether each world's episode has ended by itself."""
@@ -370,15 +375,14 @@ class VectorEnv(GymnasiumVectorEnv[Any, Any, Any]):
                 for k in np.flatnonzero(ended):
                     last[k] = {key: array[k] for key, array in rows.items()} if isinstance(rows, dict) else rows[k]
                 result[name] = last
+            elif name == "final_info":
+                result[name] = self._infos_of_rows(value)
             elif isinstance(value, list):
                 result[name] = np.repeat(np.array(value, dtype=object), len(self.batch.agents))
             elif np.ndim(value) == 1:
                 result[name] = self._repeat(value)
             else:
                 result[name] = _in_rows(value)
-        if "final_obs" in result and "final_info" not in result:
-            result["final_info"] = {}
-            result["_final_info"] = result["_final_obs"]
         return result
 
 

@@ -160,8 +160,8 @@ def _register(task: Task) -> None:
             _pettingzoo.register(kind, f"sidestep/{task.id}", entry_point, kwargs={"task": task.id})
 
 
-for _task in TASKS.values():
-    _register(_task)
-    _module = _module_of(_task)
+for _one in TASKS.values():
+    _register(_one)
+    _module = _module_of(_one)
     globals()[_module.__name__.rpartition(".")[2]] = _module
-del _module, _task
+del _module, _one

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import html
 import json
+import re
 import shutil
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -326,11 +328,39 @@ def write_leaderboard(
     weights and the program that reads them, are copied into the folder. ``sidestep replay FOLDER/runs/NAME/SEED`` repeats a
     recorded run without the policy, and tells whether the digest is the same.
 
-    Raises InputError when the folder exists already.
+    Raises InputError when the folder exists already, a name cannot be that of a folder, or a file is not there.
     """
-    folder = Path(folder)
-    if folder.exists():
-        raise input_error("folder", f"{folder} exists already", "give another name, or delete it")
+    complete = Path(folder)
+    if complete.exists():
+        raise input_error("folder", f"{complete} exists already", "give another name, or delete it")
+    for name in entries:
+        if not re.fullmatch(r"[\w-][\w.-]*", name):
+            raise input_error("entries", f"`{name}` is no name of a folder", "use letters, digits, `_`, `-` and `.`")
+    for file in files:
+        if not Path(file).is_file():
+            raise input_error("files", f"{file} is not there", "give files that exist")
+    # Under another name until all is written: a folder with a part of it would be taken for a leaderboard.
+    complete.parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix=f".{complete.name}-", dir=complete.parent))
+    try:
+        _write_entries(folder, task, entries, runs, seed, recorded, files, workers)
+        folder.rename(complete)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return Leaderboard.read(complete)
+
+
+def _write_entries(
+    folder: Path,
+    task: Task,
+    entries: Mapping[str, Policy | str],
+    runs: int,
+    seed: int,
+    recorded: int,
+    files: Sequence[str | PathLike[str]],
+    workers: int,
+) -> None:
     judgments = judge_all(task, entries, runs, seed, workers)
     for name, entry in entries.items():
         for k in range(min(recorded, runs)):
@@ -351,7 +381,6 @@ def write_leaderboard(
         },
     }
     (folder / FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    return Leaderboard.read(folder)
 
 
 def _record(folder: Path, task: Task, entry: Policy | str, seed: int, digest: str) -> None:

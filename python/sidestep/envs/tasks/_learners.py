@@ -61,15 +61,20 @@ def sb3_env(task: Task, num_envs: int, **options: Any) -> Any:
             self.vector.close()
 
         def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-            return [getattr(self.vector, attr_name)] * len(list(self._get_indices(indices)))
+            # Learners with masks ask for them by this name.
+            owner = self if attr_name == "action_masks" else self.vector
+            return [getattr(owner, attr_name)] * len(list(self._get_indices(indices)))
+
+        def action_masks(self) -> Any:
+            """Returns which choices make sense now, a row for each environment."""
+            return self.vector.tasks.action_masks().astype(bool).reshape(self.num_envs, -1)
 
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
             raise input_error("set_attr", "the worlds share one object", "give options when it is made")
 
         def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
             if method_name == "action_masks":
-                masks = self.vector.tasks.action_masks().astype(bool)
-                return list(masks.reshape(self.num_envs, -1)[list(self._get_indices(indices))])
+                return list(self.action_masks()[list(self._get_indices(indices))])
             raise input_error("env_method", f"there is no `{method_name}`", 'the only one is "action_masks"')
 
         def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
@@ -81,7 +86,8 @@ def sb3_env(task: Task, num_envs: int, **options: Any) -> Any:
 def torchrl_env(task: Task, worlds: int, *, device: Any = None, **options: Any) -> Any:
     """Returns many worlds as an ``EnvBase`` of TorchRL with the batch size (worlds,), in the manner of its multi-agent
     environments: the key ``agents`` has ``observation``, ``action``, ``reward`` and, where there is one, ``action_mask``, with
-    a row for each agent. It takes the arguments of :class:`TaskBatch`.
+    a row for each agent. It takes the arguments of :class:`TaskBatch`, but ``mask`` and ``copy``: masks have a key of their own, and
+    steps are kept, so that their arrays may not be overwritten.
     """
     try:
         import torch
@@ -91,6 +97,8 @@ def torchrl_env(task: Task, worlds: int, *, device: Any = None, **options: Any) 
     except ImportError as error:
         raise ImportError("this needs TorchRL: pip install 'torchrl>=0.6'") from error
 
+    for name in sorted({"mask", "copy"} & set(options)):
+        raise input_error(name, "an environment of TorchRL has no such option", "leave it out")
     batch = TaskBatch(task, worlds, autoreset_mode=AutoresetMode.DISABLED, **options)
     agents, size = len(batch.agents), batch.encoder.size
     shape = (worlds, agents)

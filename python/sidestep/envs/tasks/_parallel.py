@@ -68,6 +68,11 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Starts an episode with this seed, or with one that is drawn. ``options`` are ignored."""
         observed, infos = self.batch.reset(seed=seed)
+        if not self.batch.is_active().any():
+            # Nobody is there yet.
+            own = {name: infos[name] for name in ("seed", "_seed")}
+            _, _, infos = self._advance(infos)
+            observed, infos = self.batch.observed(), {**infos, **own}
         active = self.batch.is_active()[0].tolist()
         self.agents = [agent for agent, is_there in zip(self.possible_agents, active, strict=True) if is_there]
         return self._split(observed, self.agents), self._infos(infos, self.agents)
@@ -79,19 +84,18 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         agents = self.agents
         if not agents:
             raise input_error("step", "no episode is in progress", "call reset first")
-        given = self._idle.copy()
-        if len(actions) == len(self.possible_agents) == len(agents):
-            self._check(actions, agents)
-            given[:] = [actions[agent] for agent in agents]
-        else:
-            self._check(actions, agents)
-            for agent in agents:
-                given[self._numbers[agent]] = actions[agent]
+        self._check(actions, agents)
+        # In the type that was given: the worlds refuse numbers that are no choices.
+        chosen = np.asarray([actions[agent] for agent in agents])
+        given = chosen
+        if len(agents) < len(self.possible_agents):
+            given = np.zeros(self._idle.shape, chosen.dtype)
+            given[[self._numbers[agent] for agent in agents]] = chosen
         observed, rewards, terminations, truncations, infos = self.batch.step(given[None])
         is_over, is_truncated = bool(terminations[0]), bool(truncations[0])
         active = self.batch.is_active()[0].tolist()
-        if not any(active):
-            infos = self._finish(infos)
+        if not (any(active) or is_over or is_truncated):
+            is_over, is_truncated, infos = self._advance(infos)
             # Others may have come meanwhile.
             observed = self.batch.observed()
             active = self.batch.is_active()[0].tolist()
@@ -109,11 +113,13 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
             self._infos(infos, told),
         )
 
-    def _finish(self, infos: dict[str, Any]) -> dict[str, Any]:
-        """Lets a world without agents go on to its end, such as one in which others still fly, and returns the last infos."""
-        while not infos.get("_score", [False])[0] and not self.batch.is_active().any():
-            *_, infos = self.batch.step(self._idle[None])
-        return infos
+    def _advance(self, infos: dict[str, Any]) -> tuple[bool, bool, dict[str, Any]]:
+        """Lets a world without agents go on until one is there or the episode ends; returns how that ended, and its infos."""
+        is_over = is_truncated = False
+        while not (is_over or is_truncated or self.batch.is_active().any()):
+            *_, terminations, truncations, infos = self.batch.step(self._idle[None])
+            is_over, is_truncated = bool(terminations[0]), bool(truncations[0])
+        return is_over, is_truncated, infos
 
     def _check(self, actions: Mapping[str, Any], agents: list[str]) -> None:
         missing = [agent for agent in agents if agent not in actions]

@@ -129,13 +129,16 @@ class Task:
 
     def scenario(self, method: str | None = None, keys: Mapping[str, Any] | None = None) -> Scenario:
         """Returns the scenario whose agents a caller controls, or in which a scripted method does."""
+        keys = keys or {}
         if method is None:
             chosen = self.control
+            # Keys within what the control replaces, such as targets, are for the description of the task alone.
+            keys = {key: value for key, value in keys.items() if not key.startswith(tuple(f"{one}." for one in chosen))}
         elif method in self.methods:
             chosen = self.methods[method]
         else:
             raise input_error("method", f"there is no `{method}`", f"one of {', '.join(self.methods)}")
-        return with_keys(self.path, {**chosen, **(keys or {})})
+        return with_keys(self.path, {**chosen, **keys})
 
     def setting(self, keys: Mapping[str, Any] | None = None, max_cycles: int | None = None) -> Setting:
         """Returns what the parts of the task are made for."""
@@ -158,7 +161,10 @@ def with_keys(path: Path, keys: Mapping[str, Any]) -> Scenario:
             part: Any = content
             for place in places:
                 part = part[place]
-            part.pop(last, None)
+            if isinstance(part, list):
+                part.pop(int(last))
+            else:
+                part.pop(last, None)
         scenario = Scenario(content, base=path.parent)
     rest = {key: value for key, value in keys.items() if value is not None}
     return scenario.set(rest) if rest else scenario

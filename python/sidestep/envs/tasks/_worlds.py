@@ -95,6 +95,7 @@ class TaskBatch(Batch):
         self._encoded = [np.zeros((*self._shape, self.encoder.size), np.float32) for _ in range(2)]
         self._before_arrays: dict[str, NDArray[Any]] = {}
         self._now_arrays: dict[str, NDArray[Any]] = {}
+        self._reward_parts: dict[str, NDArray[np.float64]] = {}
         #: The orders of the last step, by name (worlds, agents, ...).
         self.last_orders: dict[str, NDArray[Any]] = {}
         self._has_mask = mask and self.design.actions.mask is not None
@@ -165,22 +166,22 @@ class TaskBatch(Batch):
 
     def _compute_rewards(self) -> NDArray[np.float64]:
         rows = self._shape[0] * self._shape[1]
-        total = np.zeros(rows)
-        for term in self.terms.values():
-            total += term.weight * compute_rewards(term.measure, self._before_arrays, self._now_arrays, rows)
-        if self.design.is_active is not None:
-            # The step with which an agent is gone still counts: in it, it arrives.
-            total[~self.design.is_active(self._before_arrays)] = 0.0
-        return total.reshape(self._shape)
+        active = None if self.design.is_active is None else self.design.is_active(self._before_arrays)
+        for name, term in self.terms.items():
+            part = term.weight * compute_rewards(term.measure, self._before_arrays, self._now_arrays, rows)
+            if active is not None:
+                # The step with which an agent is gone still counts: in it, it arrives.
+                part[~active] = 0.0
+            self._reward_parts[name] = part.reshape(self._shape)
+        return np.asarray(np.sum(list(self._reward_parts.values()), axis=0))
+
+    def _drop_rewards(self, mask: NDArray[np.bool_]) -> None:
+        for part in self._reward_parts.values():
+            part[mask] = 0.0
 
     def reward_parts(self) -> dict[str, NDArray[np.float64]]:
         """Returns the weighted terms of the last rewards, by name: arrays (worlds, agents)."""
-        rows = self._shape[0] * self._shape[1]
-        return {
-            name: term.weight
-            * compute_rewards(term.measure, self._before_arrays, self._now_arrays, rows).reshape(self._shape)
-            for name, term in self.terms.items()
-        }
+        return {name: part.copy() for name, part in self._reward_parts.items()}
 
     def _is_over(self) -> NDArray[np.bool_]:
         over = np.asarray(super()._is_over())
@@ -201,6 +202,8 @@ class TaskBatch(Batch):
 
     def action_masks(self) -> NDArray[np.int8]:
         """Returns which choices make sense now (worlds, agents, choices): 1 for those that do."""
+        if not self._now_arrays:
+            raise input_error("action_masks", "no episode is in progress", "call reset first")
         parts = self.design.actions.parts
         if self.design.actions.mask is None:
             return np.ones((*self._shape, len(parts)), np.int8)
@@ -213,17 +216,13 @@ class TaskBatch(Batch):
         return self.design.is_active(self._now_arrays).reshape(self._shape)
 
     def _order(self, actions: Any) -> None:
-        actions = np.asarray(actions)
+        # A copy: policies may fill the same array again.
+        actions = np.array(actions)
         expected = (*self._shape, *(self.single_action_space.shape or ()))
         if actions.shape != expected:
             raise input_error("actions", f"their shape is {actions.shape}", f"give an array of the shape {expected}")
         rows = actions.reshape(-1, *actions.shape[2:])
-        if isinstance(self.single_action_space, spaces.Box) and not np.isfinite(rows).all():
-            raise input_error("actions", "one is not a finite number", "give numbers from -1 to 1")
-        if isinstance(self.single_action_space, spaces.Discrete):
-            choices = int(self.single_action_space.n)
-            if not np.issubdtype(rows.dtype, np.integer) or ((rows < 0) | (rows >= choices)).any():
-                raise input_error("actions", "one is no choice", f"give whole numbers from 0 to {choices - 1}")
+        check_actions(self.single_action_space, rows)
         orders = self.design.actions.orders(rows, self._now_arrays)
         self.last_orders = {name: values.reshape(*self._shape, *values.shape[1:]) for name, values in orders.items()}
         for name, values in self.last_orders.items():
@@ -266,6 +265,18 @@ class TaskVectorEnv(VectorEnv):
         #: The worlds.
         self.tasks = TaskBatch(task, worlds_of(num_envs, agents), **options)
         self._wrap(self.tasks)
+
+
+def check_actions(space: spaces.Space[Any], rows: NDArray[Any]) -> None:
+    """Refuses actions that are not in their space, but for numbers beyond the bounds, which are cut."""
+    if isinstance(space, spaces.Box):
+        if not np.issubdtype(rows.dtype, np.number) or not np.isfinite(rows).all():
+            raise input_error("actions", "one is not a finite number", "give numbers from -1 to 1")
+        return
+    counts = space.nvec if isinstance(space, spaces.MultiDiscrete) else np.array(space.n)  # type: ignore[attr-defined]
+    if not np.issubdtype(rows.dtype, np.integer) or ((rows < 0) | (rows >= counts)).any():
+        remedy = " and ".join(f"0 to {count - 1}" for count in np.atleast_1d(counts))
+        raise input_error("actions", "one is no choice", f"give whole numbers from {remedy}")
 
 
 def chosen_terms(known: Mapping[str, RewardTerm], weights: Mapping[str, float] | None) -> dict[str, RewardTerm]:

@@ -114,18 +114,34 @@ class LineTracker:
 
 
 def middle_line(corridor: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Returns the middle of a corridor as points of equal distances, from its beginning at the origin, eastward."""
-    at, heading = np.zeros(2), 0.0
-    points = [at]
-    for leg in corridor["legs"]:
-        length_m = leg.get("straight_m", abs(math.radians(leg.get("turn_deg", 0.0))) * leg.get("radius_m", 0.0))
-        bend_per_m = math.radians(leg.get("turn_deg", 0.0)) / length_m
-        for _ in range(round(length_m / LINE_STEP_M)):
-            middle = heading + 0.5 * bend_per_m * LINE_STEP_M
-            at = at + LINE_STEP_M * np.array([math.cos(middle), math.sin(middle)])
-            heading += bend_per_m * LINE_STEP_M
-            points.append(at)
-    return np.array(points)
+    """Returns the middle of a corridor as points of equal distances along it, from its beginning at the origin, eastward."""
+    legs = [(_leg_length_m(leg), math.radians(leg.get("turn_deg", 0.0))) for leg in corridor["legs"]]
+    total_m = sum(length_m for length_m, _ in legs)
+    along_m = np.arange(int(total_m / LINE_STEP_M + 1e-9) + 1) * LINE_STEP_M
+    points = np.zeros((len(along_m), 2))
+    begin, heading, begin_m = np.zeros(2), 0.0, 0.0
+    for length_m, turn_rad in legs:
+        within = along_m >= begin_m - 1e-9
+        points[within] = _along_leg(begin, heading, along_m[within] - begin_m, turn_rad / length_m)
+        begin = _along_leg(begin, heading, np.array([length_m]), turn_rad / length_m)[0]
+        heading += turn_rad
+        begin_m += length_m
+    return points
+
+
+def _leg_length_m(leg: Mapping[str, Any]) -> float:
+    if "straight_m" in leg:
+        return float(leg["straight_m"])
+    return abs(math.radians(leg["turn_deg"])) * float(leg["radius_m"])
+
+
+def _along_leg(begin: NDArray[Any], heading: float, by_m: NDArray[Any], bend_per_m: float) -> NDArray[np.float64]:
+    """Returns the points so far along a leg, which is straight or an arc."""
+    half = 0.5 * bend_per_m * by_m
+    # The chord of an arc is shorter than the arc, and halfway turned.
+    chord_m = by_m * np.sinc(half / np.pi)
+    direction = np.stack([np.cos(heading + half), np.sin(heading + half)], axis=1)
+    return np.asarray(begin + chord_m[:, None] * direction)
 
 
 # What chains observe.
@@ -162,13 +178,18 @@ def _offset_of_target(connector: int, arrays: Arrays) -> NDArray[Any]:
 # What they may do.
 
 
+def _shortened(actions: NDArray[Any]) -> NDArray[np.float64]:
+    """Returns actions in bounds, and none longer than 1."""
+    clipped = np.clip(actions.astype(np.float64), -1.0, 1.0)
+    length = np.sqrt((clipped * clipped).sum(axis=1, keepdims=True))
+    return np.asarray(clipped / np.maximum(length, 1.0))
+
+
 def _toward(tip: int, step_m: float, dimensions: int) -> Actions:
     """Returns the action of moving a connector, as far as it goes."""
 
     def orders(actions: NDArray[Any], arrays: Arrays) -> dict[str, NDArray[Any]]:
-        clipped = np.clip(actions.astype(np.float64), -1.0, 1.0)
-        length = np.sqrt((clipped * clipped).sum(axis=1, keepdims=True))
-        to_m = arrays["joints_m"][:, tip] + step_m * clipped / np.maximum(length, 1.0)
+        to_m = arrays["joints_m"][:, tip] + step_m * _shortened(actions)
         n = len(actions)
         return {"to_m": to_m, "connector": np.full(n, tip), "reach": np.ones(n, np.int64)}
 
@@ -266,6 +287,9 @@ def _corridor_design(setting: Setting) -> Design:
     step_m = speed_m_s * setting.keys["chain"]["dt_s"]
     last = len(line_m) - 1
     length_m = last * LINE_STEP_M
+    # Of a shorter chain, all.
+    connectors = setting.spaces["joints_m"].shape[0]
+    watched = min(WATCHED, connectors)
 
     def own(vectors: NDArray[Any], arrays: Arrays) -> NDArray[Any]:
         return _in_line_frame(line_m, vectors, arrays)
@@ -291,9 +315,12 @@ def _corridor_design(setting: Setting) -> Design:
             )
             for k, by_m in enumerate(AHEAD_M)
         ),
-        *(vector(f"rod_{k}", f"rod {k}, forward", partial(rod, k), 1.0, "ahead left") for k in range(WATCHED)),
+        *(
+            vector(f"rod_{k}", f"rod {k}, forward", partial(rod, k), 1.0, "ahead left")
+            for k in range(min(WATCHED, connectors - 1))
+        ),
     ]
-    for k in range(WATCHED):
+    for k in range(watched):
         look_m = setting.spaces["gap_m"].high
         gap = scaled(f"gap_{k}", f"gap of connector {k} in m", partial(_part, "gap_m", k), 0, look_m)
         meaning = f"way from connector {k} to the nearest wall"
@@ -309,7 +336,8 @@ def _corridor_design(setting: Setting) -> Design:
 
     def orders(actions: NDArray[Any], arrays: Arrays) -> dict[str, NDArray[Any]]:
         number = np.rint(arrays["along_m"] / LINE_STEP_M).astype(np.int64)
-        return world_frame.orders(rotated(np.clip(actions, -1.0, 1.0), headings[number]), arrays)
+        # Long ones are shortened before they are turned: after it, their direction would change.
+        return world_frame.orders(rotated(_shortened(actions), headings[number]), arrays)
 
     parts = tuple(f"way {axis} in a cycle: 1 is {step_m:g} m, the speed limit" for axis in ("ahead", "to the left"))
     rewards = {

@@ -18,8 +18,6 @@ FORWARD = 0
 STEPS = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
 #: The words by which sensors tell of bodies that move by themselves.
 MOVERS = ("robot", "person")
-#: A robot that reaches its goal has the next one at least so many boxes away: goals change within a region, too.
-MIN_JUMP_BOXES = 4
 
 
 # What robots observe.
@@ -126,29 +124,53 @@ def mask_of_contacts(choices: int, arrays: Arrays) -> NDArray[np.bool_]:
     """Returns which actions make sense: forward not where a wall has just stopped it."""
     mask = np.ones((len(arrays["heading"]), choices), bool)
     mask[:, FORWARD] = ~((arrays["contact_side"] == 1) & (arrays["contact"] == 2))
+    mask[arrays["due"] == 0, : choices - 1] = False
     return mask
 
 
 # What they are rewarded for.
 
 
-def _reached(before: Arrays, after: Arrays) -> NDArray[np.bool_]:
-    near = (before["goal_steps"] >= 0) & (before["goal_steps"] <= 2)
-    return np.asarray(near & (after["goal_steps"] - before["goal_steps"] >= MIN_JUMP_BOXES))
+#: A rectangle of boxes: column, row, width, height.
+Region = tuple[int, int, int, int]
 
 
-def _measure_goal(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return _reached(before, after).astype(float)
+def _inside(boxes: NDArray[Any], region: Region) -> NDArray[np.bool_]:
+    col, row, width, height = region
+    return np.asarray(((boxes >= (col, row)) & (boxes < (col + width, row + height))).all(axis=1))
+
+
+def _has_new_goal(before: Arrays, after: Arrays) -> NDArray[np.bool_]:
+    return np.asarray((before["goal_boxes"] != after["goal_boxes"]).any(axis=1))
+
+
+def _reached(regions: list[Region], before: Arrays, after: Arrays) -> NDArray[np.bool_]:
+    """Returns who has come to its goal: to the very box, or into the region of its trip and now has a goal in another one."""
+    old, new, at = before["goal_boxes"], after["goal_boxes"], after["at_boxes"]
+    is_there = (at == old).all(axis=1)
+    for region in regions:
+        is_there |= _inside(at, region) & _inside(old, region) & ~_inside(new, region)
+    return np.asarray(is_there & _has_new_goal(before, after) & (old[:, 0] >= 0))
+
+
+def _measure_goal(regions: list[Region], before: Arrays, after: Arrays) -> NDArray[Any]:
+    return _reached(regions, before, after).astype(float)
 
 
 def _measure_progress(before: Arrays, after: Arrays) -> NDArray[Any]:
     known = (before["goal_steps"] >= 0) & (after["goal_steps"] >= 0)
+    # The steps to another goal say nothing of the way to this one.
+    same = known & ~_has_new_goal(before, after)
     nearer = before["goal_steps"] - after["goal_steps"]
-    return np.where(known & ~_reached(before, after), np.clip(nearer, -2, 2), 0.0)
+    return np.where(same, np.clip(nearer, -2, 2), 0.0)
 
 
 def _measure_contact(before: Arrays, after: Arrays) -> NDArray[Any]:
-    return (after["contact"] > 0).astype(float)
+    # Where it does not act, the contact of its last action still stands.
+    acts = before["due"] > 0
+    if "busy_cycles" in before:
+        acts = acts & (before["busy_cycles"] == 0)
+    return ((after["contact"] > 0) & acts).astype(float)
 
 
 def _measure_time(before: Arrays, after: Arrays) -> NDArray[Any]:
@@ -163,12 +185,13 @@ def _measure_moved(before: Arrays, after: Arrays) -> NDArray[Any]:
     return np.asarray(np.abs(after["at_boxes"] - before["at_boxes"]).sum(axis=1), float)
 
 
-GOAL_REWARDS = {
-    "goal": RewardTerm("1 where a goal was reached", 1.0, _measure_goal),
-    "progress": RewardTerm("boxes nearer to the goal, along the shortest path", 0.05, _measure_progress),
-    "contact": RewardTerm("1 where something stopped the last action", -0.05, _measure_contact),
-    "time": RewardTerm("1 in each cycle", -0.01, _measure_time),
-}
+def _goal_rewards(regions: list[Region]) -> dict[str, RewardTerm]:
+    return {
+        "goal": RewardTerm("1 where a goal was reached", 1.0, partial(_measure_goal, regions)),
+        "progress": RewardTerm("boxes nearer to the goal, along the shortest path", 0.05, _measure_progress),
+        "contact": RewardTerm("1 where something stopped the last action", -0.05, _measure_contact),
+        "time": RewardTerm("1 in each cycle", -0.01, _measure_time),
+    }
 
 
 def _trips(metrics: Mapping[str, Any], tracked: Arrays) -> float:
@@ -185,7 +208,10 @@ DELIVERIES = Score("deliveries", "tasks that were finished", True, _finished)
 
 def _goal_design(sensor: str, setting: Setting) -> Design:
     features = [*beams(setting, sensor), *touch(setting), *goal(setting), time_left()]
-    return Design(features, moves(setting, mask_of_goals), GOAL_REWARDS)
+    behaviour = setting.keys["robots"][0].get("behaviour", {})
+    # A trip of a shuttle ends anywhere in its region, an errand in its box.
+    regions = [tuple(behaviour[end]) for end in ("a", "b")] if behaviour.get("kind") == "shuttle" else []
+    return Design(features, moves(setting, mask_of_goals), _goal_rewards(regions))
 
 
 # Exploration.
@@ -298,7 +324,9 @@ def _heard(range_boxes: float, arrays: Arrays) -> NDArray[Any]:
         np.eye(SYMBOLS)[chosen & (SYMBOLS - 1)],
     ]
     told = np.concatenate(parts, axis=2) * is_heard[rows, nearest][:, :, None]
-    return told.reshape(len(word), -1)
+    # Where there are fewer robots, the places of the others stay empty.
+    missing = MAX_SENDERS - told.shape[1]
+    return np.pad(told, ((0, 0), (0, missing), (0, 0))).reshape(len(word), -1)
 
 
 def _radio_design(setting: Setting) -> Design:
