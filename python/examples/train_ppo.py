@@ -172,7 +172,7 @@ class Trainer:
             observed, rewards, terminated, truncated, infos = self.env.step(as_actions(self.space, action))
             reward = torch.from_numpy(rewards.astype(np.float32))
             ended = terminated | truncated
-            if ended.any():
+            if "score" in infos:
                 scores += [
                     float(score) for score in infos["score"][:: len(self.env.batch.agents)] if np.isfinite(score)
                 ]

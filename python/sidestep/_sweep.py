@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -230,7 +231,8 @@ def compare(
 def _is_task(scenario: object) -> bool:
     """Returns whether it is a task, or the name of one; nothing is imported for what is none."""
     if isinstance(scenario, str):
-        return scenario.startswith("sidestep/") and not os.path.exists(scenario)
+        is_name = scenario.startswith("sidestep/") or re.fullmatch(r"[A-Z]\w*-v\d+", scenario) is not None
+        return is_name and not os.path.exists(scenario)
     kinds = {f"{kind.__module__}.{kind.__name__}" for kind in type(scenario).__mro__}
     return "sidestep.envs.tasks._task.Task" in kinds
 

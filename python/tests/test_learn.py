@@ -251,6 +251,8 @@ def test_fields_of_packed_records_and_empty_columns_are_read_as_they_are() -> No
     assert not packed["turn_deg"].flags.aligned
     expected = learn.effector({**plain, "turn_deg": turns}).report
     assert learn.effector({**plain, "turn_deg": packed["turn_deg"]}).report == expected
-    empty = {name: np.array([], "U7" if name == "action" else float) for name in ("action", "ahead_boxes", "left_boxes")}
+    empty = {
+        name: np.array([], "U7" if name == "action" else float) for name in ("action", "ahead_boxes", "left_boxes")
+    }
     with pytest.raises(sidestep.InputError):
         learn.effector({**empty, "turn_deg": np.array([])})

@@ -47,7 +47,9 @@ def test_gymnasium_makes_each_and_its_checker_passes(name):
     check_env(env.unwrapped, skip_render_check=True)
     env.reset(seed=1)
     image = env.render()
-    assert min(image.shape[:2]) > 50 and image.shape[2] == 3
+    assert image.shape == (150, 200, 3)
+    env.step(env.action_space.sample())
+    assert env.render().shape == image.shape, "films need frames of one size"
     # Bodies are drawn: some of it is neither white nor the gray of letters and walls.
     colors = image.reshape(-1, 3).astype(int)
     assert (np.ptp(colors, axis=1) > 40).sum() > 20, "bodies have colors"
@@ -201,7 +203,7 @@ def test_a_cut_episode_is_truncated_and_one_that_is_done_is_terminated():
         _, _, terminated, truncated, infos = env.step(np.zeros(2))
         assert (terminated, truncated) == (False, k == 4)
     assert infos["score"] == 0.0 and infos["metrics"]["vetoes"] == 0
-    with pytest.raises(sidestep.InputError, match="the episode of world 0 has ended"):
+    with pytest.raises(sidestep.InputError, match="the episode has ended, or none has begun\n  help: call reset"):
         env.step(np.zeros(2))
     done = tasks.make("ReachInClutter-v0")
     done.reset(seed=1)
@@ -273,7 +275,37 @@ def test_masks_are_in_infos_and_where_asked_for_in_observations():
     assert blocked
 
 
+def test_an_airplane_that_arrives_is_terminated_in_its_row():
+    env = tasks.vector_env("MixedSpeeds-v0", 9)
+    env.reset(seed=2)
+    ends = np.zeros(9, int)
+    for _ in range(250):
+        *_, terminated, truncated, infos = env.step(np.full(9, 14))
+        ends += terminated
+        if "_score" in infos:
+            break
+    assert (infos["active"] == 0).all() and infos["metrics"][0]["arrived"] == infos["metrics"][0]["airplanes"]
+    assert ends.min() >= 1, "each has ended, not the last alone"
+
+
 def test_wrong_input_names_the_argument():
+    with pytest.raises(sidestep.InputError, match="did you mean `ReachInClutter-v0`"):
+        tasks.make("ReachInCluter-v0")
+    with pytest.raises(sidestep.InputError, match="width: is -3"):
+        tasks.make("Exploration-v0", width=-3)
+    with pytest.raises(sidestep.InputError, match="is no dict"):
+        tasks.make("Exploration-v0", rewards=lambda before, after: 0)
+    reach = tasks.make("ReachInClutter-v0")
+    reach.reset(seed=1)
+    for wrong in (np.zeros(3), "left", None):
+        with pytest.raises(sidestep.InputError, match=re.escape("give numbers of the shape (2,)")):
+            reach.step(wrong)
+    rows = tasks.vector_env("CrossingStreams-v0", 24)
+    rows.reset(seed=1)
+    with pytest.raises(sidestep.InputError, match=re.escape("give numbers of the shape (24,)")):
+        rows.step(np.zeros(12, int))
+    with pytest.raises(sidestep.InputError, match="policy `mine`: it returned None for 1 observations"):
+        sidestep.compare("Exploration-v0", methods={"mine": lambda observed, masks: None}, runs=1)
     with pytest.raises(
         sidestep.InputError, match="task: there is no `Nothing-v0`\n  help: one of CorridorCounterflow-v0"
     ):
@@ -304,7 +336,7 @@ def test_wrong_input_names_the_argument():
         radio = tasks.batch_env("RadioHall-v0", 1)
         radio.reset(seed=1)
         radio.step(np.full((1, 12, 2), 7))
-    with pytest.raises(sidestep.InputError, match="one is no choice"):
+    with pytest.raises(sidestep.InputError, match="numbers of the type float64 are no choices"):
         env.step(dict.fromkeys(env.agents, 1.9))
     with pytest.raises(sidestep.InputError, match="action_masks: no episode is in progress"):
         tasks.make("Exploration-v0").action_masks()
@@ -355,7 +387,12 @@ def test_each_arrival_is_rewarded_also_where_the_next_goal_is_near():
 def test_the_middle_of_the_corridor_is_as_far_from_both_walls():
     from sidestep.envs.tasks.chain import LINE_STEP_M, middle_line
 
-    legs = [{"straight_m": 2.0}, {"radius_m": 1.5, "turn_deg": 90}, {"straight_m": 1.0}, {"radius_m": 1.5, "turn_deg": -180}]
+    legs = [
+        {"straight_m": 2.0},
+        {"radius_m": 1.5, "turn_deg": 90},
+        {"straight_m": 1.0},
+        {"radius_m": 1.5, "turn_deg": -180},
+    ]
     line = middle_line({"legs": legs})
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     np.testing.assert_allclose(steps, LINE_STEP_M, rtol=2e-3)
@@ -454,6 +491,15 @@ def test_policies_and_methods_are_compared_seed_by_seed():
         sidestep.compare({"world": "airspace"}, methods={"mine": way_point_policy})
 
 
+def test_a_policy_whose_arithmetic_depends_on_the_batch_is_recorded_as_it_was_judged(tmp_path):
+    def moody(observed, masks):
+        # The last bits of a sum over all rows, as matrix products have them.
+        return observed[:, 2:4] * (1.0 + 1e-7 * len(observed))
+
+    board = tasks.write_leaderboard(tmp_path / "board", "ReachInClutter-v0", {"moody": moody}, runs=2, recorded=2)
+    assert len(board.runs) == 2
+
+
 def test_a_leaderboard_is_written_read_and_replayed(tmp_path, command):
     task = tasks.find_task("ReachInClutter-v0")
 
@@ -480,7 +526,9 @@ def test_a_leaderboard_is_written_read_and_replayed(tmp_path, command):
     with pytest.raises(sidestep.InputError, match="entries: `../out` is no name of a folder"):
         tasks.write_leaderboard(tmp_path / "other", task, {"../out": "targets"}, runs=1)
     with pytest.raises(sidestep.InputError, match="files: .*nothing.pt is not there"):
-        tasks.write_leaderboard(tmp_path / "other", task, {"targets": "targets"}, runs=1, files=[tmp_path / "nothing.pt"])
+        tasks.write_leaderboard(
+            tmp_path / "other", task, {"targets": "targets"}, runs=1, files=[tmp_path / "nothing.pt"]
+        )
     assert not list(tmp_path.glob("*other*")), "nothing is left of a board that was refused"
     with pytest.raises(sidestep.InputError, match="is no leaderboard"):
         tasks.Leaderboard.read(tmp_path)

@@ -28,7 +28,6 @@ from typing import Any
 import gymnasium as _gymnasium
 import pettingzoo as _pettingzoo
 
-from ..._errors import input_error
 from . import airspace as _airspace
 from . import chain as _chain
 from . import robots as _robots
@@ -45,11 +44,10 @@ from ._learners import sb3_env as _sb3_env
 from ._learners import torchrl_env as _torchrl_env
 from ._parallel import TaskParallelEnv, snake_case
 from ._single import TaskEnv
-from ._task import Design, RewardTerm, Score, Setting, Task
+from ._task import TASKS, Design, RewardTerm, Score, Setting, Task, found_task
 from ._worlds import TaskBatch, TaskVectorEnv
 
-#: All tasks, by their names with the version, such as ``Superconflict-v0``.
-TASKS: dict[str, Task] = {task.id: task for task in (*_robots.TASKS, *_chain.TASKS, *_airspace.TASKS)}
+TASKS.update({task.id: task for task in (*_robots.TASKS, *_chain.TASKS, *_airspace.TASKS)})
 
 __all__ = [
     "TASKS",
@@ -80,14 +78,7 @@ __all__ = [
 ]
 
 
-def find_task(task: str | Task) -> Task:
-    """Returns a task by its name, such as ``Superconflict-v0`` or ``sidestep/Superconflict-v0``."""
-    if isinstance(task, Task):
-        return task
-    name = task.removeprefix("sidestep/")
-    if name in TASKS:
-        return TASKS[name]
-    raise input_error("task", f"there is no `{task}`", f"one of {', '.join(TASKS)}")
+find_task = found_task
 
 
 def make(task: str | Task, **options: Any) -> TaskEnv:

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import stats
-from ..._errors import InputError, checked_int, input_error
+from ..._errors import ReplayError, checked_int, input_error
 from ..._native import Batch as Worlds
 from ..._native import Simulation, __version__
-from ._task import TIME_LEFT, Task, acting_team
+from ._task import TIME_LEFT, Task, acting_team, found_task
 from ._worlds import TaskBatch
 
 Policy = Callable[[NDArray[np.float32], "NDArray[np.int8] | None"], NDArray[Any]]
@@ -70,17 +70,43 @@ class Judgment:
         return low > 0.0 if self.is_higher_better else high < 0.0
 
 
+Orders = list[dict[str, NDArray[Any]]]
+"""The orders of a world by cycle: arrays (agents, ...) by name."""
+
+
 def judge(
-    task: Task, policy: Policy, *, name: str = "policy", runs: int = 100, seed: int = FIRST_SEED, workers: int = 1
+    task: Task | str,
+    policy: Policy,
+    *,
+    name: str = "policy",
+    runs: int = 100,
+    seed: int = FIRST_SEED,
+    workers: int = 1,
 ) -> Judgment:
-    """Returns the scores of a policy, of an episode with each of ``runs`` seeds from ``seed`` on."""
+    """Returns the scores of a policy, of an episode with each of ``runs`` seeds from ``seed`` on.
+
+    The policy is called once for each cycle, with a row for each agent of up to 50 worlds, one world after the other; rows of
+    agents that are gone are among them, and nobody obeys their actions.
+    """
+    return _judge_and_keep(found_task(task), policy, name, runs, seed, workers, 0)[0]
+
+
+def _judge_and_keep(
+    task: Task, policy: Policy, name: str, runs: int, seed: int, workers: int, kept: int
+) -> tuple[Judgment, list[Orders]]:
+    """Returns the scores, and the orders of the first ``kept`` episodes."""
     runs = checked_int("runs", runs, 1, 1_000_000)
     scores, digests = np.zeros(runs), [""] * runs
+    orders: list[Orders] = [[] for _ in range(min(kept, runs))]
     for first in range(0, runs, MAX_WORLDS):
         count = min(MAX_WORLDS, runs - first)
         batch = TaskBatch(task, count, workers=workers)
         ended = np.zeros(count, bool)
-        for infos in _episodes(batch, policy, seed + first):
+        for infos in _episodes(batch, policy, name, seed + first):
+            for k in range(first, min(first + count, len(orders))):
+                if not ended[k - first]:
+                    row = {order: values[k - first] for order, values in batch.last_orders.items()}
+                    orders[k].append(row)
             fresh = infos.get("_score", ended) & ~ended
             if fresh.any():
                 found = batch.worlds.digests
@@ -90,10 +116,11 @@ def judge(
                 ended |= fresh
             if ended.all():
                 break
-    return Judgment(task.id, name, task.score.is_higher_better, seed + np.arange(runs), scores, digests)
+    judgment = Judgment(task.id, name, task.score.is_higher_better, seed + np.arange(runs), scores, digests)
+    return judgment, orders
 
 
-def _episodes(batch: TaskBatch, policy: Policy, seed: int) -> Any:
+def _episodes(batch: TaskBatch, policy: Policy, name: str, seed: int) -> Any:
     """Lets a policy act, and yields the infos of each cycle; worlds that have ended go on with further episodes."""
     reset = getattr(policy, "reset", None)
     if reset is not None:
@@ -106,15 +133,20 @@ def _episodes(batch: TaskBatch, policy: Policy, seed: int) -> Any:
         rows = observed.reshape(-1, observed.shape[2])
         masks = infos["action_mask"].reshape(len(rows), -1) if has_mask else None
         actions = np.asarray(policy(rows, masks))
-        if len(actions) != len(rows):
-            cause = f"the policy returned {len(actions)} actions for {len(rows)} agents"
-            raise input_error("policy", cause, "return an array with a row for each observation")
+        expected = (len(rows), *(batch.single_action_space.shape or ()))
+        if actions.shape != expected:
+            given = "None" if actions.dtype == object else f"an array of the shape {actions.shape}"
+            cause = f"it returned {given} for {len(rows)} observations"
+            raise input_error(f"policy `{name}`", cause, f"return an array of the shape {expected}")
         observed, _, _, _, infos = batch.step(actions.reshape(*shape, *actions.shape[1:]))
         yield infos
 
 
-def judge_method(task: Task, method: str, *, runs: int = 100, seed: int = FIRST_SEED, workers: int = 1) -> Judgment:
+def judge_method(
+    task: Task | str, method: str, *, runs: int = 100, seed: int = FIRST_SEED, workers: int = 1
+) -> Judgment:
     """Returns the scores of a scripted method, on the seeds on which :func:`judge` judges a policy."""
+    task = found_task(task)
     runs = checked_int("runs", runs, 1, 1_000_000)
     scores, digests = np.zeros(runs), [""] * runs
     for first in range(0, runs, MAX_WORLDS):
@@ -196,7 +228,7 @@ def _with_interval(value: float, interval: Any, sign: str = "") -> str:
 
 
 def compare_on_task(
-    task: Task,
+    task: Task | str,
     methods: Mapping[str, Policy | str] | Sequence[str] | None = None,
     *,
     runs: int = 100,
@@ -208,6 +240,7 @@ def compare_on_task(
     ``methods`` are policies, or names of scripted methods, by the names under which they are listed; or names alone. By
     default they are all scripted methods. The others are compared with the first.
     """
+    task = found_task(task)
     if methods is None:
         methods = list(task.methods)
     entries = dict(methods) if isinstance(methods, Mapping) else {name: name for name in methods}
@@ -222,7 +255,7 @@ def compare_on_task(
         one: dict[str, Any] = {"method": name, "score": {"mean": mean.mean, "interval": mean.interval, "n": mean.n}}
         if found is not first:
             pairs = first.compare(found)
-            verdict = "beats it" if first.beats(found) else "loses to it" if found.beats(first) else "is alike"
+            verdict = "beats it" if first.beats(found) else "loses to it" if found.beats(first) else "undecided"
             one["first_less_this"] = {
                 "difference": pairs.difference,
                 "interval": pairs.interval,
@@ -313,7 +346,7 @@ class Leaderboard:
 
 def write_leaderboard(
     folder: str | PathLike[str],
-    task: Task,
+    task: Task | str,
     entries: Mapping[str, Policy | str],
     *,
     runs: int = 100,
@@ -330,6 +363,7 @@ def write_leaderboard(
 
     Raises InputError when the folder exists already, a name cannot be that of a folder, or a file is not there.
     """
+    task = found_task(task)
     complete = Path(folder)
     if complete.exists():
         raise input_error("folder", f"{complete} exists already", "give another name, or delete it")
@@ -361,10 +395,18 @@ def _write_entries(
     files: Sequence[str | PathLike[str]],
     workers: int,
 ) -> None:
-    judgments = judge_all(task, entries, runs, seed, workers)
+    judgments = {}
     for name, entry in entries.items():
-        for k in range(min(recorded, runs)):
-            _record(folder / "runs" / name / str(seed + k), task, entry, seed + k, judgments[name].digests[k])
+        place = folder / "runs" / name
+        if isinstance(entry, str):
+            found = judge_method(task, entry, runs=runs, seed=seed, workers=workers)
+            judgments[name] = replace(found, name=name)
+            for k in range(min(recorded, runs)):
+                _record_method(place / str(seed + k), task, entry, seed + k, found.digests[k])
+            continue
+        judgments[name], orders = _judge_and_keep(task, entry, name, runs, seed, workers, recorded)
+        for k, given in enumerate(orders):
+            _record_orders(place / str(seed + k), task, given, seed + k, judgments[name].digests[k])
     (folder / "files").mkdir(parents=True)
     for file in files:
         shutil.copy(file, folder / "files")
@@ -383,39 +425,36 @@ def _write_entries(
     (folder / FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
-def _record(folder: Path, task: Task, entry: Policy | str, seed: int, digest: str) -> None:
-    """Records one run, the same as was judged."""
+# The plan of a recorded run ends where the episode ends: it is complete then, and can be verified.
+
+
+def _record_method(folder: Path, task: Task, method: str, seed: int, digest: str) -> None:
+    """Records a run of a scripted method, the same as was judged."""
+    cycles = _judged_cycles(task, method, seed)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    # The plan of the recorded run ends where the episode ends: it is complete then, and can be verified.
-    if isinstance(entry, str):
-        cycles = _judged_cycles(task, entry, seed)
-        sim = Simulation(task.scenario(entry).set(cycles=cycles), seed=seed, out=folder)
-        sim.run()
-    else:
-        batch = TaskBatch(task, 1)
-        given = []
-        for infos in _episodes(batch, entry, seed):
-            given.append(batch.last_orders)
-            if "_score" in infos and infos["_score"][0]:
-                break
-        sim = Simulation(batch.scenario.set(cycles=len(given)), seed=seed, out=folder)
-        for orders in given:
-            for order, values in orders.items():
-                sim.order(order, values[0], team=batch.team_number)
-            sim.step()
+    sim = Simulation(task.scenario(method).set(cycles=cycles), seed=seed, out=folder)
+    sim.run()
+    _close(sim, digest)
+
+
+def _record_orders(folder: Path, task: Task, given: Orders, seed: int, digest: str) -> None:
+    """Records a run with the orders of a policy that was judged."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    sim = Simulation(task.scenario().set(cycles=len(given)), seed=seed, out=folder)
+    number = next(k for k, team in enumerate(sim.teams) if team.action_spaces)
+    for orders in given:
+        for order, values in orders.items():
+            sim.order(order, values, team=number)
+        sim.step()
+    _close(sim, digest)
+
+
+def _close(sim: Simulation, digest: str) -> None:
     found = sim.digest
     sim.close()
     if found != digest:
-        # Policies whose arithmetic depends on how many observations come at once do that.
-        cause = f"the run of seed {seed} alone ended with another digest than among others"
-        raise InputError(
-            f"entries: {cause}\n  help: let the policy decide for each row by itself",
-            "entries",
-            None,
-            None,
-            None,
-            cause,
-            "",
+        raise ReplayError(
+            f"a recorded run ended with the digest {found}, not {digest}: this is a bug; please report it"
         )
 
 

@@ -16,8 +16,10 @@ from ._worlds import TaskBatch, TaskVectorEnv
 def sb3_env(task: Task, num_envs: int, **options: Any) -> Any:
     """Returns the agents of many worlds as a ``VecEnv`` of Stable-Baselines3, for one policy that all share.
 
-    At the end of an episode ``infos`` have ``terminal_observation``, ``TimeLimit.truncated`` and ``episode_score``, and the
-    observation is the first one of the next episode. It takes the arguments of :class:`TaskVectorEnv`.
+    At the end of an episode ``infos`` have ``terminal_observation``, ``TimeLimit.truncated``, ``score`` and ``metrics``, and the
+    observation is the first one of the next episode. An agent that is gone before its world ends is done with its last step; its
+    rows mean nothing until the world restarts. Wrap it into ``VecMonitor`` for the log of returns; sb3-contrib's ``MaskablePPO`` finds
+    the masks. It takes the arguments of :class:`TaskVectorEnv`.
     """
     try:
         from stable_baselines3.common.vec_env import VecEnv
@@ -48,13 +50,16 @@ def sb3_env(task: Task, num_envs: int, **options: Any) -> Any:
         def step_wait(self) -> Any:
             observed, rewards, terminations, truncations, infos = self.vector.step(self._actions)
             ended = terminations | truncations
+            is_world_over = infos.get("_final_obs", np.zeros(self.num_envs, bool))
             told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
             for k in np.flatnonzero(ended):
                 told[k] = {
-                    "terminal_observation": infos["final_obs"][k],
+                    "terminal_observation": infos["final_obs"][k] if is_world_over[k] else observed[k],
                     "TimeLimit.truncated": bool(truncations[k]),
-                    "episode_score": float(infos["score"][k]),
                 }
+                # Airplanes that arrive end before their world.
+                if "score" in infos and infos["_score"][k]:
+                    told[k] |= {"score": float(infos["score"][k]), "metrics": infos["metrics"][k]}
             return observed, rewards.astype(np.float32), ended, told
 
         def close(self) -> None:

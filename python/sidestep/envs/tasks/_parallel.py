@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..._errors import input_error
 from ._show import RENDER_MODES, show
-from ._single import RenderMode, check_render_mode
-from ._task import Task
+from ._single import RenderMode, check_render_mode, image_size
+from ._task import RewardTerm, Task
 from ._worlds import TaskBatch
 
 
@@ -34,7 +34,7 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         self.task = task
         self.metadata = {**self.metadata, "name": f"{snake_case(task.name)}_v{task.version}"}
         self.render_mode = render_mode
-        self._width = width
+        self._size = image_size(width)
         self.possible_agents = list(self.batch.agents)
         self.agents: list[str] = []
         self._numbers = {agent: k for k, agent in enumerate(self.possible_agents)}
@@ -43,6 +43,16 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         one = self.batch.single_action_space
         # The action of agents that are gone: any, since nobody obeys it.
         self._idle = np.zeros((len(self.possible_agents), *(one.shape or ())), one.dtype)
+
+    @property
+    def observation_parts(self) -> list[tuple[str, str]]:
+        """The name and the meaning of each number of an agent's observation."""
+        return self.batch.observation_parts
+
+    @property
+    def terms(self) -> dict[str, RewardTerm]:
+        """The terms of the reward, by name."""
+        return self.batch.terms
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Returns the space of an agent's observations."""
@@ -122,12 +132,13 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         return is_over, is_truncated, infos
 
     def _check(self, actions: Mapping[str, Any], agents: list[str]) -> None:
-        missing = [agent for agent in agents if agent not in actions]
-        if missing:
-            raise input_error("actions", f"`{missing[0]}` has no action", "give one for each agent")
-        if len(actions) > len(agents):
-            unknown = sorted(set(actions) - set(agents))[0]
-            raise input_error("actions", f"there is no agent `{unknown}`", "give those of `agents`")
+        if actions.keys() == set(agents):
+            return
+        unknown = sorted(set(actions) - set(agents))
+        if unknown:
+            raise input_error("actions", f"there is no agent `{unknown[0]}`", "give those of `agents`")
+        missing = next(agent for agent in agents if agent not in actions)
+        raise input_error("actions", f"`{missing}` has no action", "give one for each agent")
 
     def _split(self, observed: Any, agents: list[str]) -> dict[str, Any]:
         if isinstance(observed, dict):
@@ -153,7 +164,7 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         """Returns an image (height, width, 3), or text with "ansi"; with "human" it shows the image in a window."""
         if self.render_mode is None:
             return None
-        return show(self.batch.render(0, self._width), self.render_mode, self.task.id)
+        return show(self.batch.worlds.render(0, size=self._size), self.render_mode, self.task.id)
 
     def close(self) -> None:
         """Ends the worlds."""

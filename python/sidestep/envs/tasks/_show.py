@@ -31,11 +31,13 @@ def to_text(image: NDArray[np.uint8]) -> str:
     points = _shrunk(image, rows, columns)
     lines = []
     for above, below in zip(points[0::2], points[1::2], strict=True):
-        letters = [
-            f"\x1b[38;2;{r};{g};{b};48;2;{red};{green};{blue}m▀"
-            for (r, g, b), (red, green, blue) in zip(above.tolist(), below.tolist(), strict=True)
-        ]
-        lines.append("".join(letters) + "\x1b[0m")
+        line, last = "", None
+        for (r, g, b), (red, green, blue) in zip(above.tolist(), below.tolist(), strict=True):
+            colors = f"\x1b[38;2;{r};{g};{b};48;2;{red};{green};{blue}m"
+            # Colors stand until others are given.
+            line += "▀" if colors == last else f"{colors}▀"
+            last = colors
+        lines.append(f"{line}\x1b[0m")
     return "\n".join(lines) + "\n"
 
 

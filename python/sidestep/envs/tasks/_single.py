@@ -10,10 +10,10 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from ..._errors import input_error
+from ..._errors import checked_int, input_error
 from ._show import RENDER_MODES, show
-from ._task import Task
-from ._worlds import TaskBatch
+from ._task import RewardTerm, Task
+from ._worlds import TaskBatch, as_actions
 
 RenderMode = Literal["rgb_array", "human", "ansi"]
 
@@ -38,11 +38,22 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self.batch = TaskBatch(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
         self.task = task
         self.render_mode = render_mode
-        self._width = width
+        self._size = image_size(width)
+        self._has_ended = True
         self._agents = len(self.batch.agents)
         self._is_alone = self._agents == 1
         self.observation_space = self._space_of_all(self.batch.single_observation_space)
         self.action_space = self._space_of_all(self.batch.single_action_space)
+
+    @property
+    def observation_parts(self) -> list[tuple[str, str]]:
+        """The name and the meaning of each number of an agent's observation."""
+        return self.batch.observation_parts
+
+    @property
+    def terms(self) -> dict[str, RewardTerm]:
+        """The terms of the reward, by name."""
+        return self.batch.terms
 
     def _space_of_all(self, one: spaces.Space[Any]) -> spaces.Space[Any]:
         if self._is_alone:
@@ -60,17 +71,22 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         """Starts an episode with this seed, or with one that is drawn; ``infos["seed"]`` has it. ``options`` are ignored."""
         super().reset(seed=seed)
         observed, infos = self.batch.reset(seed=seed)
+        self._has_ended = False
         if self.render_mode == "human":
             self.render()
         return self._of_world(observed), self._infos(infos)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Applies an action, and simulates one cycle."""
-        actions = np.asarray(action)[None, None] if self._is_alone else np.asarray(action)[None]
+        if self._has_ended:
+            raise input_error("step", "the episode has ended, or none has begun", "call reset")
+        one = as_actions(action, self.action_space.shape or ())
+        actions = one[None, None] if self._is_alone else one[None]
         observed, rewards, terminations, truncations, infos = self.batch.step(actions)
         if self.render_mode == "human":
             self.render()
         reward = float(rewards[0].mean())
+        self._has_ended = bool(terminations[0] or truncations[0])
         return self._of_world(observed), reward, bool(terminations[0]), bool(truncations[0]), self._infos(infos)
 
     def _of_world(self, observed: Any) -> Any:
@@ -98,11 +114,17 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         """Returns an image (height, width, 3), or text with "ansi"; with "human" it shows the image in a window."""
         if self.render_mode is None:
             return None
-        return show(self.batch.render(0, self._width), self.render_mode, self.task.id)
+        return show(self.batch.worlds.render(0, size=self._size), self.render_mode, self.task.id)
 
     def close(self) -> None:
         """Ends the worlds."""
         self.batch.close()
+
+
+def image_size(width: int) -> tuple[int, int]:
+    """Returns the size of all images of an episode in pixels: films need frames of one size."""
+    width = checked_int("width", width, 64, 4096)
+    return width, width * 3 // 4
 
 
 def check_render_mode(render_mode: str | None) -> None:

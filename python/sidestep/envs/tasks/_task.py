@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,6 +118,9 @@ class Task:
     #: Whether it has a single agent.
     is_single: bool = False
 
+    def __repr__(self) -> str:
+        return f"Task({self.id}: {self.meaning} Methods: {', '.join(self.methods)}.)"
+
     @property
     def id(self) -> str:
         """Its name with the version, such as ``Superconflict-v0``."""
@@ -148,6 +152,22 @@ class Task:
         # The file says where agents are to go, which those that take orders are not told.
         described = with_keys(self.path, keys or {})
         return Setting(described.to_dict(), team, names, max_cycles or scenario.cycles)
+
+
+#: All tasks, by their names with the version, such as ``Superconflict-v0``.
+TASKS: dict[str, Task] = {}
+
+
+def found_task(task: str | Task) -> Task:
+    """Returns a task by its name, such as ``Superconflict-v0`` or ``sidestep/Superconflict-v0``."""
+    if isinstance(task, Task):
+        return task
+    name = str(task).removeprefix("sidestep/")
+    if name in TASKS:
+        return TASKS[name]
+    near = difflib.get_close_matches(name, TASKS, 1)
+    remedy = f"did you mean `{near[0]}`? " if near else ""
+    raise input_error("task", f"there is no `{task}`", f"{remedy}one of {', '.join(TASKS)}")
 
 
 def with_keys(path: Path, keys: Mapping[str, Any]) -> Scenario:

@@ -258,13 +258,48 @@ class TaskBatch(Batch):
 
 
 class TaskVectorEnv(VectorEnv):
-    """The agents of many worlds of a task as Gymnasium's vector environment, for one policy that all share."""
+    """The agents of many worlds of a task as Gymnasium's vector environment, for one policy that all share.
+
+    An agent that is gone before its world ends, such as an airplane that has arrived, is terminated with its last step. Its
+    row stays, and means nothing until the world restarts: ``infos["active"]`` tells which rows count.
+    """
 
     def __init__(self, task: Task, num_envs: int, **options: Any) -> None:
         agents = len(task.setting(options.get("keys")).team)
         #: The worlds.
         self.tasks = TaskBatch(task, worlds_of(num_envs, agents), **options)
         self._wrap(self.tasks)
+
+    @property
+    def observation_parts(self) -> list[tuple[str, str]]:
+        """The name and the meaning of each number of an observation."""
+        return self.tasks.observation_parts
+
+    @property
+    def terms(self) -> dict[str, RewardTerm]:
+        """The terms of the reward, by name."""
+        return self.tasks.terms
+
+    def step(
+        self, actions: Any
+    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Applies an action of each environment, and simulates one cycle; see :meth:`sidestep.envs.Batch.step`."""
+        given = as_actions(actions, (self.num_envs, *(self.single_action_space.shape or ())))
+        was_active = self.tasks.is_active().ravel()
+        observed, rewards, terminated, truncated, infos = super().step(given)
+        # Worlds that restart in the same step have agents again.
+        ended = terminated | truncated
+        is_gone = was_active & ~self.tasks.is_active().ravel() & ~ended
+        return observed, rewards, terminated | is_gone, truncated, infos
+
+
+def as_actions(actions: Any, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Returns actions as an array of this shape."""
+    array = np.asarray(actions)
+    if array.shape != shape or array.dtype.kind not in "biuf":
+        given = f"of the shape {array.shape}" if array.dtype.kind in "biuf" else f"{actions!r}"
+        raise input_error("actions", f"they are {given}", f"give numbers of the shape {shape}")
+    return array
 
 
 def check_actions(space: spaces.Space[Any], rows: NDArray[Any]) -> None:
@@ -276,13 +311,17 @@ def check_actions(space: spaces.Space[Any], rows: NDArray[Any]) -> None:
     counts = space.nvec if isinstance(space, spaces.MultiDiscrete) else np.array(space.n)  # type: ignore[attr-defined]
     if not np.issubdtype(rows.dtype, np.integer) or ((rows < 0) | (rows >= counts)).any():
         remedy = " and ".join(f"0 to {count - 1}" for count in np.atleast_1d(counts))
-        raise input_error("actions", "one is no choice", f"give whole numbers from {remedy}")
+        is_whole = np.issubdtype(rows.dtype, np.integer)
+        cause = "one is no choice" if is_whole else f"numbers of the type {rows.dtype} are no choices"
+        raise input_error("actions", cause, f"give whole numbers from {remedy}")
 
 
 def chosen_terms(known: Mapping[str, RewardTerm], weights: Mapping[str, float] | None) -> dict[str, RewardTerm]:
     """Returns the terms of a reward with other weights."""
     if weights is None:
         return dict(known)
+    if not isinstance(weights, Mapping):
+        raise input_error("rewards", f"{weights!r} is no dict", f"give weights to some of {', '.join(known)}")
     chosen = {}
     for name, weight in weights.items():
         if name not in known:

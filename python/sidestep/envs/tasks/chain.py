@@ -40,6 +40,7 @@ class TargetTracker:
             "targets_reached": np.zeros(rows, np.int64),
             "target_m": np.zeros((rows, targets_m.shape[1])),
             "is_reached": np.zeros(rows, bool),
+            "patience_left": np.ones(rows),
         }
 
     def restart(self, mask: NDArray[np.bool_], observed: Arrays) -> None:
@@ -50,6 +51,7 @@ class TargetTracker:
         self.arrays["targets_reached"][mask] = 0
         self.arrays["is_reached"][mask] = False
         self.arrays["target_m"][mask] = self._targets_m[0]
+        self.arrays["patience_left"][mask] = 1.0
 
     def advance(self, mask: NDArray[np.bool_], observed: Arrays) -> None:
         """Counts targets that are visited. The next one is due when the present one is, or was not for a long time: in
@@ -72,6 +74,7 @@ class TargetTracker:
         self.arrays["is_reached"][:] = fresh.any(axis=1)
         self.arrays["targets_reached"][:] = self._is_visited.sum(axis=1)
         self.arrays["target_m"][:] = self._targets_m[self._number]
+        self.arrays["patience_left"][:] = 1.0 - self._age_cycles / (self._patience_cycles + 1)
 
 
 class LineTracker:
@@ -246,6 +249,13 @@ def _reach_design(setting: Setting) -> Design:
         ),
         *_clearances(setting, range(connectors), axes),
         *_own_state(setting),
+        scaled(
+            "patience_left",
+            "share left of the time for this target, after which the next one is due",
+            lambda arrays: arrays["patience_left"],
+            0,
+            1,
+        ),
         scaled("targets_reached", "targets reached", lambda arrays: arrays["targets_reached"], 0, len(targets)),
         time_left(),
     ]
