@@ -1,10 +1,10 @@
-"""Steps a second beside two other simulators, on the task of theirs that is nearest.
+"""Steps a second and memory beside other simulators, on the task of theirs that is nearest.
 
     python python/benches/beside.py
 
 One world with 10, 100 and 1,000 robots at one density; all of them observe and get a random action in every step. It counts agent-steps per
-CPU second of one thread, the best of several tries. Packages that are not installed (``vmas``, ``pogema``) are left
-out, and named.
+CPU second of one thread, the best of several tries, and the peak of memory of a process that runs these alone, with what it
+imports. Packages that are not installed (``vmas``, ``pogema``, ``mpe2``) are left out, and named.
 
 They are not the same task, so the figures tell the order of magnitude and no more:
 
@@ -12,12 +12,17 @@ They are not the same task, so the figures tell the order of magnitude and no mo
   bit. Arrays are `Simulation.order`, `step` and `observe`; dicts are PettingZoo's interface.
 * VMAS (scenario `navigation`): discs in continuous space, forces and collisions by pairs, a lidar of 12 rays. It is made to step
   thousands of small worlds at once on a GPU; one large world on a processor is its worst case, so 32 worlds of 10 are shown, too.
+* Tasks of ``sidestep.envs.tasks``: observations of float32 from -1 to 1, rewards of named terms and masks, as learners take them.
+* MPE (``simple_spread``): discs in the plane, by PettingZoo's dicts. CartPole: Gymnasium's vector of 256, an environment of one agent.
 * POGEMA: robots on a grid that see the cells within 5 of them, without errors; moves that would collide are canceled.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import resource
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 
@@ -83,6 +88,44 @@ def ours() -> Iterator[tuple[str, int, float]]:
         yield "Sidestep, PettingZoo's dicts", count, rate(dicts, count)
 
 
+def our_tasks() -> Iterator[tuple[str, int, float]]:
+    from sidestep.envs import tasks
+
+    for name, worlds in (("CorridorCounterflow-v0", 256), ("Exploration-v0", 256), ("Superconflict-v0", 32)):
+        batch = tasks.batch_env(name, worlds, copy=False)
+        batch.reset(seed=1)
+        batch.action_space.seed(1)
+        drawn = [batch.action_space.sample() for _ in range(16)]
+        turn = iter(range(10**9))
+
+        def step(batch: tasks.TaskBatch = batch, drawn: list[object] = drawn, turn: Iterator[int] = turn) -> None:
+            batch.step(drawn[next(turn) % len(drawn)])
+
+        agents = worlds * len(batch.agents)
+        yield f"Sidestep, {name}", agents, rate(step, agents)
+
+
+def mpe() -> Iterator[tuple[str, int, float]]:
+    from mpe2 import simple_spread_v3
+
+    rng = np.random.default_rng(1)
+    env = simple_spread_v3.parallel_env(N=10, max_cycles=10**9)
+    env.reset(seed=1)
+
+    def step() -> None:
+        env.step(dict(zip(env.agents, rng.integers(0, 5, 10).tolist(), strict=True)))
+
+    yield "MPE, simple_spread", 10, rate(step, 10)
+
+
+def cart_pole() -> Iterator[tuple[str, int, float]]:
+    import gymnasium
+
+    env = gymnasium.make_vec("CartPole-v1", num_envs=256)
+    env.reset(seed=1)
+    yield "CartPole, a vector of 256", 256, rate(lambda: env.step(env.action_space.sample()), 256)
+
+
 def vmas() -> Iterator[tuple[str, int, float]]:
     import torch
     from vmas import make_env
@@ -121,17 +164,40 @@ def pogema() -> Iterator[tuple[str, int, float]]:
         yield "POGEMA", count, rate(step, count)
 
 
+#: The figures by simulator, and the package that they need.
+FIGURES = {
+    "Sidestep": ("sidestep", ours),
+    "Sidestep's tasks": ("gymnasium", our_tasks),
+    "VMAS": ("vmas", vmas),
+    "POGEMA": ("pogema", pogema),
+    "MPE": ("mpe2", mpe),
+    "CartPole": ("gymnasium", cart_pole),
+}
+
+
+def measure(name: str) -> None:
+    """Prints the figures of a simulator, and the peak of memory of this process."""
+    try:
+        for what, agents, found in FIGURES[name][1]():
+            print(f"{what:<34} {agents:>6} agents {found:>14,.0f} agent-steps per CPU second", flush=True)
+    except Exception as error:  # Another version of it, or of its needs: that is said, and the others go on.
+        print(f"left out: {name}, which does not run here: {type(error).__name__}: {error}")
+        return
+    peak_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(f"{name + ', peak of memory':<34} {peak_kib / 1024:>21,.0f} MiB", flush=True)
+
+
 def main() -> None:
-    for name, figures in (("sidestep", ours), ("vmas", vmas), ("pogema", pogema)):
-        if importlib.util.find_spec(name) is None:
-            print(f"left out: {name}, since it is not installed (pip install {name}, in an environment of its own)")
+    for name, (package, _) in FIGURES.items():
+        if importlib.util.find_spec(package) is None:
+            print(f"left out: {name}, since it is not installed (pip install {package}, in an environment of its own)")
             continue
-        try:
-            for what, agents, found in figures():
-                print(f"{what:<30} {agents:>6} agents {found:>14,.0f} agent-steps per CPU second", flush=True)
-        except Exception as error:  # Another version of it, or of its needs: that is said, and the others go on.
-            print(f"left out: {name}, which does not run here: {type(error).__name__}: {error}")
+        # A process each: what one imports is not in the memory of the next.
+        subprocess.run([sys.executable, __file__, name], check=False)
 
 
 if __name__ == "__main__":
-    main()
+    if len(sys.argv) > 1:
+        measure(sys.argv[1])
+    else:
+        main()
