@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
@@ -24,6 +24,12 @@ from ._parallel import (
     space_of,
 )
 from ._rewards import Reward, compute_rewards
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._options import Autoreset, BatchOptions
+
 
 Observations = dict[str, NDArray[Any]]
 Actions = NDArray[Any] | Mapping[str, NDArray[Any]]
@@ -59,7 +65,7 @@ class Batch:
         rewards: Mapping[str, float] | Reward | None = None,
         orders: Sequence[str] | None = None,
         max_cycles: int | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        autoreset_mode: Autoreset = AutoresetMode.NEXT_STEP,
         copy: bool = True,
         workers: int = 1,
     ) -> None:
@@ -301,7 +307,7 @@ class VectorEnv(GymnasiumVectorEnv[Any, Any, Any]):
         self,
         scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
         num_envs: int,
-        **options: Any,
+        **options: Unpack[BatchOptions],
     ) -> None:
         one = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
         agents = len(Batch(one, 1, **options).agents)

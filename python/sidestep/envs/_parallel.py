@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pettingzoo
@@ -14,6 +14,12 @@ from numpy.typing import NDArray
 from .._errors import checked_int, input_error
 from .._native import Scenario, Simulation, Space, Team, rows_by_name, world_facts, worlds
 from ._rewards import DEFAULTS, Reward, combine_rewards, compute_rewards
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._options import ParallelOptions
+
 
 MAX_INT64 = np.iinfo(np.int64).max
 # Cycles of an episode are at most this.
@@ -274,7 +280,9 @@ def _environment_of(world: str) -> type[ParallelEnv]:
 ENVIRONMENTS: dict[str, type[ParallelEnv]] = {world: _environment_of(world) for world in worlds()}
 
 
-def parallel_env(scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Any) -> ParallelEnv:
+def parallel_env(
+    scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Unpack[ParallelOptions]
+) -> ParallelEnv:
     """Returns the environment of the scenario's world, e.g. ``Robots``."""
     scenario = scenario if isinstance(scenario, Scenario) else Scenario(scenario)
     return ENVIRONMENTS[scenario.world](scenario, **options)

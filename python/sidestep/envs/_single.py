@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -13,6 +13,11 @@ from numpy.typing import NDArray
 from .._errors import input_error
 from .._native import Scenario
 from ._parallel import parallel_env
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._options import ParallelOptions
 
 
 class Env(gymnasium.Env[dict[str, Any], Any]):
@@ -24,7 +29,9 @@ class Env(gymnasium.Env[dict[str, Any], Any]):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
-    def __init__(self, scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Any) -> None:
+    def __init__(
+        self, scenario: Scenario | str | PathLike[str] | Mapping[str, Any], **options: Unpack[ParallelOptions]
+    ) -> None:
         self.parallel = parallel_env(scenario, **options)
         agents = self.parallel.possible_agents
         if len(agents) != 1:

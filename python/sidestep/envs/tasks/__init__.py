@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import sys as _sys
 from types import ModuleType as _ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as _gymnasium
 import pettingzoo as _pettingzoo
@@ -46,6 +46,11 @@ from ._parallel import TaskParallelEnv, snake_case
 from ._single import TaskEnv
 from ._task import TASKS, Design, RewardTerm, Score, Setting, Task, found_task
 from ._worlds import TaskBatch, TaskVectorEnv
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._options import RenderOptions, TaskOptions, WorldOptions
 
 TASKS.update({task.id: task for task in (*_robots.TASKS, *_chain.TASKS, *_airspace.TASKS)})
 
@@ -81,34 +86,34 @@ __all__ = [
 find_task = found_task
 
 
-def make(task: str | Task, **options: Any) -> TaskEnv:
+def make(task: str | Task, **options: Unpack[RenderOptions]) -> TaskEnv:
     """Returns a task as Gymnasium's environment; see :class:`TaskEnv`."""
     return TaskEnv(find_task(task), **options)
 
 
-def vector_env(task: str | Task, num_envs: int = 1, **options: Any) -> TaskVectorEnv:
+def vector_env(task: str | Task, num_envs: int = 1, **options: Unpack[TaskOptions]) -> TaskVectorEnv:
     """Returns the agents of many worlds as Gymnasium's vector environment; see :class:`TaskVectorEnv`."""
     return TaskVectorEnv(find_task(task), num_envs, **options)
 
 
-def batch_env(task: str | Task, worlds: int, **options: Any) -> TaskBatch:
+def batch_env(task: str | Task, worlds: int, **options: Unpack[TaskOptions]) -> TaskBatch:
     """Returns many worlds as arrays (worlds, agents, ...); see :class:`TaskBatch`."""
     return TaskBatch(find_task(task), worlds, **options)
 
 
-def parallel_env(task: str | Task, **options: Any) -> TaskParallelEnv:
+def parallel_env(task: str | Task, **options: Unpack[RenderOptions]) -> TaskParallelEnv:
     """Returns a task as PettingZoo's parallel environment; see :class:`TaskParallelEnv`."""
     return TaskParallelEnv(find_task(task), **options)
 
 
-def aec_env(task: str | Task, **options: Any) -> Any:
+def aec_env(task: str | Task, **options: Unpack[RenderOptions]) -> Any:
     """Returns a task in PettingZoo's form of one agent after the other; see :class:`TaskParallelEnv`."""
     from pettingzoo.utils import parallel_to_aec
 
     return parallel_to_aec(parallel_env(task, **options))
 
 
-def sb3_env(task: str | Task, num_envs: int, **options: Any) -> Any:
+def sb3_env(task: str | Task, num_envs: int, **options: Unpack[WorldOptions]) -> Any:
     """Returns the agents of many worlds as a ``VecEnv`` of Stable-Baselines3."""
     return _sb3_env(find_task(task), num_envs, **options)
 
@@ -123,11 +128,11 @@ def _module_of(task: Task) -> _ModuleType:
     name = f"{snake_case(task.name)}_v{task.version}"
     module = _ModuleType(f"{__name__}.{name}", f"The task {task.id}. {task.meaning}")
 
-    def parallel_env_of_task(**options: Any) -> TaskParallelEnv:
+    def parallel_env_of_task(**options: Unpack[RenderOptions]) -> TaskParallelEnv:
         """Returns it as PettingZoo's parallel environment."""
         return TaskParallelEnv(task, **options)
 
-    def env(**options: Any) -> Any:
+    def env(**options: Unpack[RenderOptions]) -> Any:
         """Returns it in PettingZoo's form of one agent after the other."""
         return aec_env(task, **options)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
@@ -12,8 +12,13 @@ from ..._errors import input_error
 from ._task import Task
 from ._worlds import TaskBatch, TaskVectorEnv
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
-def sb3_env(task: Task, num_envs: int, **options: Any) -> Any:
+    from .._options import WorldOptions
+
+
+def sb3_env(task: Task, num_envs: int, **options: Unpack[WorldOptions]) -> Any:
     """Returns the agents of many worlds as a ``VecEnv`` of Stable-Baselines3, for one policy that all share.
 
     At the end of an episode ``infos`` have ``terminal_observation``, ``TimeLimit.truncated``, ``score`` and ``metrics``, and the
@@ -88,7 +93,7 @@ def sb3_env(task: Task, num_envs: int, **options: Any) -> Any:
     return TaskVecEnv()
 
 
-def torchrl_env(task: Task, worlds: int, *, device: Any = None, **options: Any) -> Any:
+def torchrl_env(task: Task, worlds: int, *, device: Any = None, **options: Unpack[WorldOptions]) -> Any:
     """Returns many worlds as an ``EnvBase`` of TorchRL with the batch size (worlds,), in the manner of its multi-agent
     environments: the key ``agents`` has ``observation``, ``action``, ``reward`` and, where there is one, ``action_mask``, with
     a row for each agent. It takes the arguments of :class:`TaskBatch`, but ``mask`` and ``copy``: masks have a key of their own, and

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pettingzoo
@@ -18,6 +18,11 @@ from ._single import RenderMode, check_render_mode, image_size
 from ._task import RewardTerm, Task
 from ._worlds import TaskBatch
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._options import WorldOptions
+
 
 class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     """One world of a task, each of whose agents observes and acts for itself.
@@ -28,7 +33,9 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
 
     metadata: dict[str, Any] = {"name": "sidestep_task_v0", "render_modes": RENDER_MODES, "render_fps": 10}
 
-    def __init__(self, task: Task, *, render_mode: RenderMode | None = None, width: int = 480, **options: Any) -> None:
+    def __init__(
+        self, task: Task, *, render_mode: RenderMode | None = None, width: int = 480, **options: Unpack[WorldOptions]
+    ) -> None:
         check_render_mode(render_mode)
         self.batch = TaskBatch(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
         self.task = task

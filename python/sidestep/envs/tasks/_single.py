@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium
 import numpy as np
@@ -14,6 +14,12 @@ from ..._errors import checked_int, input_error
 from ._show import RENDER_MODES, show
 from ._task import RewardTerm, Task
 from ._worlds import TaskBatch, as_actions
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._options import WorldOptions
+
 
 RenderMode = Literal["rgb_array", "human", "ansi"]
 
@@ -33,7 +39,9 @@ class TaskEnv(gymnasium.Env[Any, Any]):
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 10}
 
-    def __init__(self, task: Task, *, render_mode: RenderMode | None = None, width: int = 480, **options: Any) -> None:
+    def __init__(
+        self, task: Task, *, render_mode: RenderMode | None = None, width: int = 480, **options: Unpack[WorldOptions]
+    ) -> None:
         check_render_mode(render_mode)
         self.batch = TaskBatch(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
         self.task = task

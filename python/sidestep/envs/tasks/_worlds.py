@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
@@ -17,6 +17,11 @@ from .._batch import Batch, VectorEnv, worlds_of
 from .._rewards import compute_rewards
 from ._features import Arrays, Feature
 from ._task import TIME_LEFT, Design, RewardTerm, Task
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._options import Autoreset, TaskOptions
 
 
 class Encoder:
@@ -75,7 +80,7 @@ class TaskBatch(Batch):
         *,
         rewards: Mapping[str, float] | None = None,
         max_cycles: int | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        autoreset_mode: Autoreset = AutoresetMode.NEXT_STEP,
         mask: bool = False,
         copy: bool = True,
         workers: int = 1,
@@ -264,7 +269,7 @@ class TaskVectorEnv(VectorEnv):
     row stays, and means nothing until the world restarts: ``infos["active"]`` tells which rows count.
     """
 
-    def __init__(self, task: Task, num_envs: int, **options: Any) -> None:
+    def __init__(self, task: Task, num_envs: int, **options: Unpack[TaskOptions]) -> None:
         agents = len(task.setting(options.get("keys")).team)
         #: The worlds.
         self.tasks = TaskBatch(task, worlds_of(num_envs, agents), **options)
