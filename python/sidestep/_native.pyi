@@ -256,7 +256,6 @@ class Batch:
         width: int = 640,
         *,
         size: tuple[int, int] | None = None,
-        agents: Sequence[int] = ...,
         view: str | None = None,
     ) -> NDArray[np.uint8]: ...
     def order(self, name: str, values: ArrayLike, *, team: int | str | None = None) -> None: ...
@@ -325,7 +324,6 @@ def run_sweep(
     out: str | PathLike[str] | None,
     workers: int,
     begin: Callable[[str, list[Trial], list[str] | None], Any] | None,
-    progress: Progress | None = None,
 ) -> Sweep: ...
 def run_task(
     build: str,

@@ -164,6 +164,7 @@ def sweep(
         "seed": _seed(seed),
         "record": record,
         "series": None if series is None else _names("series", series),
+        "progress": progress,
     }
     _count("workers", workers, 1024)
     if record and engine != "local":
@@ -172,9 +173,9 @@ def sweep(
         raise input_error("record", "there is no folder to record runs to", "give one as `out`")
     pool = _engines.task_pool(engine, workers)
     if pool is None:
-        return run_sweep(sweep, options, out, workers or 0, None, progress)
+        return run_sweep(sweep, options, out, workers or 0, None)
     try:
-        return run_sweep(sweep, options, out, pool.at_once, pool.run, progress)
+        return run_sweep(sweep, options, out, pool.at_once, pool.run)
     finally:
         pool.close()
 

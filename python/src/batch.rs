@@ -286,23 +286,23 @@ impl Batch {
     ///
     /// >>> batch.render(2, 100).shape[1:]
     /// (100, 3)
-    #[pyo3(signature = (world=0, width=640, *, size=None, agents=Vec::new(), view=None))]
+    #[pyo3(signature = (world=0, width=640, *, size=None, view=None))]
     fn render<'py>(
-        &self,
-        py: Python<'py>,
+        slf: PyRef<'py, Self>,
         world: usize,
         width: u32,
         size: Option<[u32; 2]>,
-        agents: Vec<u32>,
         view: Option<&str>,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        if world >= self.worlds {
-            let remedy = format!("give a number from 0 to {}", self.worlds - 1);
+        let py = slf.py();
+        if world >= slf.worlds {
+            let remedy = format!("give a number from 0 to {}", slf.worlds - 1);
             return Err(argument_error("world", format!("there is no world {world}"), remedy));
         }
-        let look = parse_look(width, size, agents, view)?;
-        let drawn = self
-            .with_worlds(py, |batch| batch.with_world(world, |run| self.pictures.draw(run, look)));
+        let look = parse_look(width, size, Vec::new(), view)?;
+        let Self { pictures, .. } = &*slf;
+        let drawn =
+            slf.with_worlds(py, |batch| batch.with_world(world, |run| pictures.draw(run, look)));
         let (still, size_px) = drawn??;
         to_pixels(py, &still, size_px)
     }

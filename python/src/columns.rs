@@ -52,7 +52,8 @@ impl Numbers for ChunkedNumbers {
             while done < into.len() {
                 let row = first_row + done;
                 let index = self.starts.partition_point(|start| *start <= row) - 1;
-                let (chunk, start) = (&self.chunks[index], self.starts[index]);
+                let chunk = &self.chunks[index];
+                let start = self.starts[index];
                 let length = (start + chunk.row_count() - row).min(into.len() - done);
                 chunk.read(py, row - start, &mut into[done..done + length]);
                 done += length;
@@ -199,7 +200,8 @@ impl LogColumns {
         valid: Validity<'_>,
     ) -> PyResult<()> {
         let words = self.words(name)?;
-        let (offsets, characters) = (offsets.as_slice()?, characters.as_slice()?);
+        let offsets = offsets.as_slice()?;
+        let characters = characters.as_slice()?;
         for (row, ends) in offsets.windows(2).enumerate() {
             let word = characters.get(ends[0] as usize..ends[1] as usize).and_then(as_text);
             words.push(valid.word(row, word));

@@ -41,13 +41,13 @@ struct TeamPolicy<'py> {
 
 /// Advances a run to a cycle under the control of policies, and returns the number of cycles done.
 pub(crate) fn run_with_policies(
-    py: Python<'_>,
     run: &impl PolicyRun,
     decide: &Bound<'_, PyAny>,
     state: Option<Bound<'_, PyAny>>,
     until: Cycle,
     reporter: Option<&ProgressReporter>,
 ) -> PyResult<u64> {
+    let py = decide.py();
     let policies = team_policies(run, decide)?;
     let state = state.unwrap_or_else(|| PyDict::new(py).into_any());
     let from = run.now(py)?;

@@ -374,7 +374,7 @@ impl Simulation {
         let reported = reporter.as_ref();
         let done = match decide {
             None => simulation.advance_to_goal(py, Goal::Until(until), reported),
-            Some(decide) => run_with_policies(py, simulation, decide, state, until, reported),
+            Some(decide) => run_with_policies(simulation, decide, state, until, reported),
         };
         if let Some(reporter) = &reporter {
             reporter.close(py)?;

@@ -48,6 +48,7 @@ pub(crate) struct SweepOptions<'py> {
     seed: Option<u64>,
     record: bool,
     series: Option<Vec<String>>,
+    progress: Option<Bound<'py, PyAny>>,
 }
 
 /// A requested sweep, read and not compiled yet.
@@ -276,18 +277,18 @@ impl TrialExecutor for PyExecutor {
 
 /// Runs a sweep on threads, all processors if `workers` is 0, or by an executor: the native part of `sidestep.sweep`.
 #[pyfunction]
-#[pyo3(signature = (sweep, options, out, workers, begin, progress=None))]
+#[pyo3(signature = (sweep, options, out, workers, begin))]
 pub(crate) fn run_sweep<'py>(
     sweep: &Bound<'py, PyAny>,
     options: SweepOptions<'py>,
     out: Option<PathBuf>,
     workers: usize,
     begin: Option<Py<PyAny>>,
-    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = sweep.py();
-    let reporter = ProgressReporter::from_argument(progress.as_ref(), "run")?;
-    let result = execute_sweep(sweep, &options, out.as_ref(), workers, begin, reporter.as_ref());
+    let reporter = ProgressReporter::from_argument(options.progress.as_ref(), "run")?;
+    let runners = Runners { workers, begin };
+    let result = execute_sweep(sweep, &options, out.as_ref(), runners, reporter.as_ref());
     if let Some(reporter) = &reporter {
         reporter.close(py)?;
     }
@@ -304,6 +305,14 @@ pub(crate) fn run_sweep<'py>(
         .build(ResultClass("sidestep._sweep", "Sweep"))
 }
 
+/// Who runs the trials of a sweep.
+struct Runners {
+    /// Threads, all processors if it is 0; or trials that the executor runs at the same time.
+    workers: usize,
+    /// The executor: see [`PyExecutor`]; none for threads.
+    begin: Option<Py<PyAny>>,
+}
+
 /// Runs a sweep until it is done.
 ///
 /// # Errors
@@ -312,8 +321,7 @@ fn execute_sweep(
     sweep: &Bound<'_, PyAny>,
     options: &SweepOptions<'_>,
     out: Option<&PathBuf>,
-    workers: usize,
-    begin: Option<Py<PyAny>>,
+    Runners { workers, begin }: Runners,
     reporter: Option<&ProgressReporter>,
 ) -> PyResult<SweepResult> {
     let py = sweep.py();

@@ -117,7 +117,8 @@ const SIDED_TURN_DEG: std::ops::RangeInclusive<f64> = 30.0..=150.0;
 /// Returns the warnings on turns that look like radians, and on those to the side that is not the commanded one.
 fn turn_warnings(all: &Displacements<'_>) -> Vec<String> {
     let mut sizes_deg = Vec::with_capacity(all.count_of(1) + all.count_of(2));
-    let (mut sided, mut wrong) = (0, 0);
+    let mut sided = 0;
+    let mut wrong = 0;
     all.visit(TURNS, &mut |displacement| {
         sizes_deg.push(displacement.turn_deg.abs());
         let along_deg = displacement.turn_along_deg();

@@ -277,7 +277,9 @@ fn move_moments(log: &dyn EventLog, counts: &MoveCounts) -> BTreeMap<String, Mom
 }
 
 fn turn_report(log: &dyn EventLog) -> Option<TurnReport> {
-    let (mut n, mut n_left, mut timed) = (0, 0, 0);
+    let mut n = 0;
+    let mut n_left = 0;
+    let mut timed = 0;
     let mut along_15deg = Histogram::new(15);
     let mut error_5deg = Histogram::new(5);
     log.visit_turns(&mut |turn| {
