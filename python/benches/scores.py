@@ -135,7 +135,7 @@ def main() -> None:
             found = tasks.judge(task, policy, name="trained", runs=args.runs)
             pairs = found.compare(best)
             low, high = pairs.interval or (pairs.difference, pairs.difference)
-            word = "better than" if found.beats(best) else "worse than" if best.beats(found) else "like"
+            word = "better than" if found.beats(best) else "worse than" if best.beats(found) else "undecided beside"
             learned, verdict = cell(found), f"{word} `{best.name}`: {pairs.difference:+.3g} [{low:+.3g}, {high:+.3g}]"
         arrow = "higher" if task.score.is_higher_better else "lower"
         print(
