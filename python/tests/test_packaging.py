@@ -19,7 +19,12 @@ except ImportError:
 #: Distributions whose packages for conda have other names.
 CONDA = {"matplotlib": "matplotlib-base", "ray": "ray-core"}
 #: Modules that have other names than the distributions that bring them.
-BROUGHT_BY = {"stable_baselines3": "stable-baselines3", "tensordict": "torchrl", "torch": "torchrl"}
+BROUGHT_BY = {
+    "stable_baselines3": "stable-baselines3",
+    "tensordict": "torchrl",
+    "torch": "torchrl",
+    "typing_extensions": "gymnasium",
+}
 #: Extras that are for work on the package itself.
 OWN = {"all", "docs", "test"}
 
