@@ -185,8 +185,8 @@ class Batch:
         return self._observed(), rewards, terminations, truncations, infos
 
     def render(self, world: int = 0, width: int = 480) -> NDArray[np.uint8]:
-        """Returns an image of the present state of a world, (height, width, 3)."""
-        return self.worlds.render(world, width)
+        """Returns an image of the present state of a world, (height, width, 3): all of one size, as films need them."""
+        return self.worlds.render(world, size=(width, width * 3 // 4))
 
     def close(self) -> None:
         """Does nothing: worlds have no open files."""

@@ -88,19 +88,17 @@ def judge(
     The policy is called once for each cycle, with a row for each agent of up to 50 worlds, one world after the other; rows of
     agents that are gone are among them, and nobody obeys their actions.
     """
-    return _judge_and_keep(found_task(task), policy, name, runs, seed, workers, 0)[0]
+    return _judge_and_keep(found_task(task), policy, name, Trials(runs, seed, workers))[0]
 
 
-def _judge_and_keep(
-    task: Task, policy: Policy, name: str, runs: int, seed: int, workers: int, kept: int
-) -> tuple[Judgment, list[Orders]]:
-    """Returns the scores, and the orders of the first ``kept`` episodes."""
-    runs = checked_int("runs", runs, 1, 1_000_000)
+def _judge_and_keep(task: Task, policy: Policy, name: str, trials: Trials) -> tuple[Judgment, list[Orders]]:
+    """Returns the scores, and the orders of the first episodes."""
+    runs, seed = checked_int("runs", trials.runs, 1, 1_000_000), trials.seed
     scores, digests = np.zeros(runs), [""] * runs
-    orders: list[Orders] = [[] for _ in range(min(kept, runs))]
+    orders: list[Orders] = [[] for _ in range(min(trials.kept, runs))]
     for first in range(0, runs, MAX_WORLDS):
         count = min(MAX_WORLDS, runs - first)
-        batch = TaskBatch(task, count, workers=workers)
+        batch = TaskBatch(task, count, workers=trials.workers)
         ended = np.zeros(count, bool)
         for infos in _episodes(batch, policy, name, seed + first):
             for k in range(first, min(first + count, len(orders))):
@@ -247,7 +245,8 @@ def compare_on_task(
     if not entries:
         raise input_error("methods", "there are none", f"give policies by name, or some of {', '.join(task.methods)}")
     seed = FIRST_SEED if seed is None else seed
-    judgments = judge_all(task, entries, runs, seed, workers)
+    trials = Trials(runs, seed, workers)
+    judgments = {name: judge_entry(task, name, entry, trials)[0] for name, entry in entries.items()}
     first, *_ = judgments.values()
     told = []
     for name, found in judgments.items():
@@ -274,18 +273,23 @@ def compare_on_task(
     )
 
 
-def judge_all(
-    task: Task, entries: Mapping[str, Policy | str], runs: int, seed: int, workers: int
-) -> dict[str, Judgment]:
-    """Returns the scores of policies, and of scripted methods by their names."""
-    judgments = {}
-    for name, entry in entries.items():
-        if isinstance(entry, str):
-            found = judge_method(task, entry, runs=runs, seed=seed, workers=workers)
-            judgments[name] = replace(found, name=name)
-        else:
-            judgments[name] = judge(task, entry, name=name, runs=runs, seed=seed, workers=workers)
-    return judgments
+@dataclass(frozen=True)
+class Trials:
+    """The episodes on which entries are judged."""
+
+    runs: int
+    seed: int
+    workers: int
+    #: Number of the first episodes whose orders are kept.
+    kept: int = 0
+
+
+def judge_entry(task: Task, name: str, entry: Policy | str, trials: Trials) -> tuple[Judgment, list[Orders]]:
+    """Returns the scores of a policy, with the orders of some episodes, or of a scripted method by its name."""
+    runs, seed, workers = trials.runs, trials.seed, trials.workers
+    if isinstance(entry, str):
+        return replace(judge_method(task, entry, runs=runs, seed=seed, workers=workers), name=name), []
+    return _judge_and_keep(task, entry, name, trials)
 
 
 @dataclass(frozen=True)
@@ -377,7 +381,7 @@ def write_leaderboard(
     complete.parent.mkdir(parents=True, exist_ok=True)
     folder = Path(tempfile.mkdtemp(prefix=f".{complete.name}-", dir=complete.parent))
     try:
-        _write_entries(folder, task, entries, runs, seed, recorded, files, workers)
+        _write_entries(folder, task, entries, files, Trials(runs, seed, workers, recorded))
         folder.rename(complete)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
@@ -389,24 +393,19 @@ def _write_entries(
     folder: Path,
     task: Task,
     entries: Mapping[str, Policy | str],
-    runs: int,
-    seed: int,
-    recorded: int,
     files: Sequence[str | PathLike[str]],
-    workers: int,
+    trials: Trials,
 ) -> None:
     judgments = {}
     for name, entry in entries.items():
-        place = folder / "runs" / name
-        if isinstance(entry, str):
-            found = judge_method(task, entry, runs=runs, seed=seed, workers=workers)
-            judgments[name] = replace(found, name=name)
-            for k in range(min(recorded, runs)):
-                _record_method(place / str(seed + k), task, entry, seed + k, found.digests[k])
-            continue
-        judgments[name], orders = _judge_and_keep(task, entry, name, runs, seed, workers, recorded)
-        for k, given in enumerate(orders):
-            _record_orders(place / str(seed + k), task, given, seed + k, judgments[name].digests[k])
+        found, orders = judge_entry(task, name, entry, trials)
+        judgments[name] = found
+        for k in range(min(trials.kept, trials.runs)):
+            place = folder / "runs" / name / str(trials.seed + k)
+            if isinstance(entry, str):
+                _record_method(place, task, entry, trials.seed + k, found.digests[k])
+            else:
+                _record_orders(place, task, orders[k], trials.seed + k, found.digests[k])
     (folder / "files").mkdir(parents=True)
     for file in files:
         shutil.copy(file, folder / "files")

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pettingzoo
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..._errors import input_error
-from ._show import RENDER_MODES, show
-from ._single import RenderMode, check_render_mode, image_size
-from ._task import RewardTerm, Task
-from ._worlds import TaskBatch
+from ._show import RENDER_MODES
+from ._single import OneWorld, RenderMode
+from ._task import Task
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
     from .._options import WorldOptions
 
 
-class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
+class TaskParallelEnv(OneWorld, pettingzoo.ParallelEnv[str, Any, Any]):
     """One world of a task, each of whose agents observes and acts for itself.
 
     Agents that have arrived are *terminated*, and no longer in ``agents``. Where all others of an episode end with it,
@@ -36,12 +34,8 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
     def __init__(
         self, task: Task, *, render_mode: RenderMode | None = None, width: int = 480, **options: Unpack[WorldOptions]
     ) -> None:
-        check_render_mode(render_mode)
-        self.batch = TaskBatch(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
-        self.task = task
+        self._open(task, render_mode, width, options)
         self.metadata = {**self.metadata, "name": f"{snake_case(task.name)}_v{task.version}"}
-        self.render_mode = render_mode
-        self._size = image_size(width)
         self.possible_agents = list(self.batch.agents)
         self.agents: list[str] = []
         self._numbers = {agent: k for k, agent in enumerate(self.possible_agents)}
@@ -50,16 +44,6 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         one = self.batch.single_action_space
         # The action of agents that are gone: any, since nobody obeys it.
         self._idle = np.zeros((len(self.possible_agents), *(one.shape or ())), one.dtype)
-
-    @property
-    def observation_parts(self) -> list[tuple[str, str]]:
-        """The name and the meaning of each number of an agent's observation."""
-        return self.batch.observation_parts
-
-    @property
-    def terms(self) -> dict[str, RewardTerm]:
-        """The terms of the reward, by name."""
-        return self.batch.terms
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Returns the space of an agent's observations."""
@@ -166,16 +150,6 @@ class TaskParallelEnv(pettingzoo.ParallelEnv[str, Any, Any]):
         if masks is None:
             return {agent: dict(common) for agent in agents}
         return {agent: {"action_mask": masks[self._numbers[agent]], **common} for agent in agents}
-
-    def render(self) -> Any:
-        """Returns an image (height, width, 3), or text with "ansi"; with "human" it shows the image in a window."""
-        if self.render_mode is None:
-            return None
-        return show(self.batch.worlds.render(0, size=self._size), self.render_mode, self.task.id)
-
-    def close(self) -> None:
-        """Ends the worlds."""
-        self.batch.close()
 
     def copy(self) -> TaskParallelEnv:
         """Returns an independent environment in the same state."""

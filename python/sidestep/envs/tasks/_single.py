@@ -24,7 +24,42 @@ if TYPE_CHECKING:
 RenderMode = Literal["rgb_array", "human", "ansi"]
 
 
-class TaskEnv(gymnasium.Env[Any, Any]):
+class OneWorld:
+    """What the environments of one world share, whatever interface they have."""
+
+    def _open(self, task: Task, render_mode: RenderMode | None, width: int, options: WorldOptions) -> None:
+        if render_mode not in (None, *RENDER_MODES):
+            remedy = f"one of {', '.join(RENDER_MODES)}, or None"
+            raise input_error("render_mode", f"there is no `{render_mode}`", remedy)
+        width = checked_int("width", width, 64, 4096)
+        # All images of an episode have one size: films need that.
+        self._size = (width, width * 3 // 4)
+        self.batch = TaskBatch(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
+        self.task = task
+        self.render_mode: str | None = render_mode
+
+    @property
+    def observation_parts(self) -> list[tuple[str, str]]:
+        """The name and the meaning of each number of an agent's observation."""
+        return self.batch.observation_parts
+
+    @property
+    def terms(self) -> dict[str, RewardTerm]:
+        """The terms of the reward, by name."""
+        return self.batch.terms
+
+    def render(self) -> Any:
+        """Returns an image (height, width, 3), or text with "ansi"; with "human" it shows the image in a window."""
+        if self.render_mode is None:
+            return None
+        return show(self.batch.worlds.render(0, size=self._size), self.render_mode, self.task.id)
+
+    def close(self) -> None:
+        """Ends the worlds."""
+        self.batch.close()
+
+
+class TaskEnv(OneWorld, gymnasium.Env[Any, Any]):
     """One world of a task.
 
     A task of one agent has that agent's observations and actions. Of a task with many it is the central controller: it
@@ -42,26 +77,12 @@ class TaskEnv(gymnasium.Env[Any, Any]):
     def __init__(
         self, task: Task, *, render_mode: RenderMode | None = None, width: int = 480, **options: Unpack[WorldOptions]
     ) -> None:
-        check_render_mode(render_mode)
-        self.batch = TaskBatch(task, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
-        self.task = task
-        self.render_mode = render_mode
-        self._size = image_size(width)
+        self._open(task, render_mode, width, options)
         self._has_ended = True
         self._agents = len(self.batch.agents)
         self._is_alone = self._agents == 1
         self.observation_space = self._space_of_all(self.batch.single_observation_space)
         self.action_space = self._space_of_all(self.batch.single_action_space)
-
-    @property
-    def observation_parts(self) -> list[tuple[str, str]]:
-        """The name and the meaning of each number of an agent's observation."""
-        return self.batch.observation_parts
-
-    @property
-    def terms(self) -> dict[str, RewardTerm]:
-        """The terms of the reward, by name."""
-        return self.batch.terms
 
     def _space_of_all(self, one: spaces.Space[Any]) -> spaces.Space[Any]:
         if self._is_alone:
@@ -117,25 +138,3 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         """Returns which choices make sense now: by this name learners with masks ask for it."""
         masks = self.batch.action_masks()[0].astype(bool)
         return np.asarray(masks[0] if self._is_alone else masks)
-
-    def render(self) -> Any:
-        """Returns an image (height, width, 3), or text with "ansi"; with "human" it shows the image in a window."""
-        if self.render_mode is None:
-            return None
-        return show(self.batch.worlds.render(0, size=self._size), self.render_mode, self.task.id)
-
-    def close(self) -> None:
-        """Ends the worlds."""
-        self.batch.close()
-
-
-def image_size(width: int) -> tuple[int, int]:
-    """Returns the size of all images of an episode in pixels: films need frames of one size."""
-    width = checked_int("width", width, 64, 4096)
-    return width, width * 3 // 4
-
-
-def check_render_mode(render_mode: str | None) -> None:
-    """Refuses a mode that there is not."""
-    if render_mode not in (None, *RENDER_MODES):
-        raise input_error("render_mode", f"there is no `{render_mode}`", f"one of {', '.join(RENDER_MODES)}, or None")

@@ -68,8 +68,8 @@ class TaskBatch(Batch):
         workers: number of workers.
         keys: keys of the scenario to set, such as ``{"robots.0.count": 4}``: for a task of your own.
 
-    ``infos`` have, for all worlds, ``action_mask`` (worlds, agents, choices) where actions are choices, and
-    ``active`` (worlds, agents): the rows of agents that are gone, or not there yet, mean nothing. Where episodes end they
+    ``infos`` have, for all worlds, ``action_mask`` (worlds, agents, choices) where actions are choices, and ``active`` (worlds,
+    agents) where agents come and go, as airplanes do: rows of those that are not there mean nothing. Where episodes end they
     have ``metrics``, the measurements of the run, and ``score``.
     """
 
@@ -205,10 +205,13 @@ class TaskBatch(Batch):
         observed: Any = encoded.copy() if copy or self._copy else encoded
         return {"observation": observed, "action_mask": self.action_masks()} if self._has_mask else observed
 
+    def _check_begun(self, call: str) -> None:
+        if not self._now_arrays:
+            raise input_error(call, "no episode is in progress", "call reset first")
+
     def action_masks(self) -> NDArray[np.int8]:
         """Returns which choices make sense now (worlds, agents, choices): 1 for those that do."""
-        if not self._now_arrays:
-            raise input_error("action_masks", "no episode is in progress", "call reset first")
+        self._check_begun("action_masks")
         parts = self.design.actions.parts
         if self.design.actions.mask is None:
             return np.ones((*self._shape, len(parts)), np.int8)
@@ -216,6 +219,7 @@ class TaskBatch(Batch):
 
     def is_active(self) -> NDArray[np.bool_]:
         """Returns which agents take part now (worlds, agents)."""
+        self._check_begun("is_active")
         if self.design.is_active is None:
             return np.ones(self._shape, bool)
         return self.design.is_active(self._now_arrays).reshape(self._shape)

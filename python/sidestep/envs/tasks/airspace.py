@@ -197,45 +197,28 @@ METHODS: dict[str, dict[str, Any]] = {
 }
 CONTROL = {"airspace.method": "external"}
 
+
+def _flight(name: str, file: str, meaning: str) -> Task:
+    return Task(name, 0, meaning, file, CONTROL, _design, DELAY, METHODS)
+
+
 TASKS = [
-    Task(
-        name="Superconflict",
-        version=0,
-        meaning="Airplanes on a circle are each bound for the opposite point; a shield keeps them apart: little delay.",
-        file="superconflict.toml",
-        control=CONTROL,
-        design=_design,
-        score=DELAY,
-        methods=METHODS,
+    _flight(
+        "Superconflict",
+        "superconflict.toml",
+        "Airplanes on a circle are each bound for the opposite point; a shield keeps them apart: little delay.",
     ),
-    Task(
-        name="CrossingStreams",
-        version=0,
-        meaning="Streams of airplanes cross, and a shield keeps them apart: little delay.",
-        file="crossing-streams.toml",
-        control=CONTROL,
-        design=_design,
-        score=DELAY,
-        methods=METHODS,
+    _flight(
+        "CrossingStreams",
+        "crossing-streams.toml",
+        "Streams of airplanes cross, and a shield keeps them apart: little delay.",
     ),
-    Task(
-        name="MixedSpeeds",
-        version=0,
-        meaning="Airplanes of different speeds meet others that avoid nobody: little delay.",
-        file="mixed-speeds.toml",
-        control=CONTROL,
-        design=_design,
-        score=DELAY,
-        methods=METHODS,
+    _flight(
+        "MixedSpeeds", "mixed-speeds.toml", "Airplanes of different speeds meet others that avoid nobody: little delay."
     ),
-    Task(
-        name="NoisySurveillance",
-        version=0,
-        meaning="Airplanes without a shield see each other by late reports that err: no losses of separation, little delay.",
-        file="noisy-surveillance.toml",
-        control=CONTROL,
-        design=_design,
-        score=DELAY,
-        methods=METHODS,
+    _flight(
+        "NoisySurveillance",
+        "noisy-surveillance.toml",
+        "Airplanes without a shield see each other by late reports that err: no losses of separation, little delay.",
     ),
 ]
