@@ -21,6 +21,7 @@ from typing import Any
 from . import _native
 from ._columns import log_columns
 from ._native import Learned
+from ._progress import Progress
 
 __all__ = ["Learned", "effector", "sensor"]
 
@@ -46,6 +47,7 @@ def effector(
     alpha: float = 0.5,
     hold_out: int = 2,
     max_unexplained: float = 0.05,
+    progress: Progress | None = None,
 ) -> Learned:
     """Learns the outcomes of an effector's actions.
 
@@ -59,7 +61,8 @@ def effector(
     uses the result warns. ``name`` chooses one of several effectors, ``robots`` some robots. ``alpha`` is added to every count
     before rows become probabilities; every ``hold_out``-th move is held out to test the model, and so is each quarter of the
     time and each robot. No interval is given where a greater share of rows than ``max_unexplained`` is left out for a reason
-    that nothing explains, such as damage.
+    that nothing explains, such as damage. ``progress`` is a function that is told the rows that are read and all, or True for a
+    bar of tqdm: rows are counted again from 0 where a table has to be read twice.
 
     Raises InputError when columns are missing or differ in length, or a value is out of range.
 
@@ -73,7 +76,7 @@ def effector(
     True
     """
     choice = {"box_m": box_m, "effector": name, "robots": [int(robot) for robot in robots]}
-    return _native.learn_effector(_options(moves, MOTIONS, alpha, hold_out, max_unexplained), choice)
+    return _native.learn_effector(_options(moves, MOTIONS, alpha, hold_out, max_unexplained, progress), choice)
 
 
 def sensor(
@@ -88,6 +91,7 @@ def sensor(
     alpha: float = 0.5,
     hold_out: int = 2,
     max_unexplained: float = 0.05,
+    progress: Progress | None = None,
 ) -> Learned:
     """Learns the reports of a sensor.
 
@@ -97,7 +101,7 @@ def sensor(
     ``edges_m`` divide distances into ``classes``, near to far, one more than edges; ``bearings_deg`` of the beams, positive
     to the left, and ``range_m`` are for the profile; a run knows all four. With ``beam`` the four-part beam model (hit, short,
     max, random) is fitted to ranges in meters, too, as it always is to those of a run; it is the sensor ``NAME-beam`` of the
-    profile. ``alpha``, ``hold_out`` and ``max_unexplained`` are as for :func:`effector`.
+    profile. ``alpha``, ``hold_out``, ``max_unexplained`` and ``progress`` are as for :func:`effector`.
 
     Raises InputError when columns are missing or differ in length, or a value is out of range.
 
@@ -117,16 +121,21 @@ def sensor(
         "sensor": name,
         "beam": beam,
     }
-    return _native.learn_sensor(_options(readings, READINGS, alpha, hold_out, max_unexplained), shape)
+    return _native.learn_sensor(_options(readings, READINGS, alpha, hold_out, max_unexplained, progress), shape)
 
 
 def _options(
-    columns: Columns, known: Sequence[str], alpha: float, hold_out: int, max_unexplained: float
+    columns: Columns,
+    known: Sequence[str],
+    alpha: float,
+    hold_out: int,
+    max_unexplained: float,
+    progress: Progress | None,
 ) -> dict[str, Any]:
     """Returns a table, as columns or as the folder that contains it, and how to learn from it."""
     options: dict[str, Any] = {
         "columns": None, "run": None, "alpha": alpha, "hold_out_every": hold_out, "max_unexplained": max_unexplained,
-        "facts": [],
+        "facts": [], "progress": progress,
     }  # fmt: skip
     if isinstance(columns, str | os.PathLike):
         options["run"] = os.fspath(columns)

@@ -4,13 +4,17 @@ use crate::columns::LogColumns;
 use crate::error::{self, argument_error};
 use crate::json::to_python;
 use crate::pickle::{self, Pickle};
+use crate::watch::{ProgressReporter, run_counting};
 use pyo3::prelude::*;
 use serde_json::Value;
+use sidestep::kernel::InputError;
 use sidestep::learn::EstimateOptions;
 use sidestep::learn::columns::ColumnTable;
 use sidestep::learn::effector::{self, EffectorOptions, LearnedEffector};
+use sidestep::learn::log_table::LogTable;
 use sidestep::learn::profile;
 use sidestep::learn::sensor::{self, LearnedSensor, RunSensorOptions, SensorOptions};
+use sidestep::learn::watched_table::WatchedTable;
 use sidestep_session::{RecordedCsv, csv_table};
 use std::path::PathBuf;
 
@@ -137,6 +141,8 @@ pub(crate) struct LearnOptions {
     alpha: f64,
     hold_out_every: usize,
     max_unexplained: f64,
+    /// A function that is told the rows that are read and all, or True for a bar.
+    progress: Option<Py<PyAny>>,
 }
 
 impl LearnOptions {
@@ -149,9 +155,38 @@ impl LearnOptions {
         taken.map_err(|e| error::input_error(&e))
     }
 
+    /// Learns in another thread, where `learn` gets a function that has its table watched.
+    fn run<T: Send>(
+        &self,
+        py: Python<'_>,
+        learn: impl FnOnce(&TableReader<'_>) -> Result<T, InputError> + Send,
+    ) -> PyResult<T> {
+        let asked = self.progress.as_ref().map(|progress| progress.bind(py));
+        let reporter = ProgressReporter::from_argument(asked, "row")?;
+        let learned = run_counting(py, reporter.as_ref(), |count| learn(&TableReader { count }));
+        if let Some(reporter) = &reporter {
+            reporter.close(py)?;
+        }
+        learned?.map_err(|e| error::input_error(&e))
+    }
+
     fn estimate(&self) -> EstimateOptions {
         let Self { alpha, hold_out_every, max_unexplained, .. } = *self;
         EstimateOptions { alpha, hold_out_every, max_unexplained, ..EstimateOptions::default() }
+    }
+}
+
+/// Counts the rows of the tables that are learned from.
+struct TableReader<'c> {
+    count: &'c (dyn Fn(u64, u64) -> bool + Sync),
+}
+
+impl TableReader<'_> {
+    /// Learns from a table whose rows are counted.
+    fn read<T>(&self, table: &dyn LogTable, learn: impl FnOnce(&dyn LogTable) -> T) -> T {
+        let all = table.row_count() as u64;
+        let watch = |rows: usize| (self.count)(rows as u64, all);
+        learn(&WatchedTable::new(table, &watch))
     }
 }
 
@@ -174,15 +209,18 @@ pub(crate) fn learn_effector(
     let EffectorChoice { box_m, effector, robots } = choice;
     let chosen = EffectorOptions { estimate: options.estimate(), box_m, effector, robots };
     let table = options.take_table(py, "motions")?;
-    let learned = py.detach(|| match &options.run {
+    let LearnOptions { run, facts, .. } = &options;
+    let learned = options.run(py, |reader| match run {
         Some(run) => {
-            let recorded = csv_table(run, "motions")?;
-            effector::learn_run(&recorded.table, &recorded.facts, &chosen)
+            let RecordedCsv { table, facts } = csv_table(run, "motions")?;
+            reader.read(&table, |table| effector::learn_run(table, &facts, &chosen))
         }
-        None if options.facts.is_empty() => effector::learn_csv(&table, &chosen),
-        None => effector::learn_run(&table, &options.facts, &chosen),
+        None if facts.is_empty() => {
+            reader.read(&table, |table| effector::learn_csv(table, &chosen))
+        }
+        None => reader.read(&table, |table| effector::learn_run(table, facts, &chosen)),
     });
-    Learned::from_effector(&learned.map_err(|e| error::input_error(&e))?)
+    Learned::from_effector(&learned?)
 }
 
 /// The shape of a sensor, as passed by `sidestep.learn.sensor`.
@@ -205,7 +243,9 @@ pub(crate) fn learn_sensor(
     shape: SensorShape,
 ) -> PyResult<Learned> {
     let table = options.take_table(py, "readings")?;
-    let learned = py.detach(|| match &options.run {
+    let LearnOptions { run, facts, .. } = &options;
+    let estimate = options.estimate();
+    let learned = options.run(py, |reader| match run {
         Some(run) => {
             let mut recorded = csv_table(run, "readings")?;
             let RecordedCsv { table, facts } = &recorded;
@@ -213,17 +253,18 @@ pub(crate) fn learn_sensor(
             if name != "readings" {
                 recorded = csv_table(run, name)?;
             }
-            let chosen = run_options(options.estimate(), shape);
-            sensor::learn_run(&recorded.table, &recorded.facts, &chosen)
+            let chosen = run_options(estimate, shape);
+            let RecordedCsv { table, facts } = &recorded;
+            reader.read(table, |table| sensor::learn_run(table, facts, &chosen))
         }
-        None if !options.facts.is_empty() => {
-            let chosen = run_options(options.estimate(), shape);
-            sensor::learn_run(&table, &options.facts, &chosen)
+        None if !facts.is_empty() => {
+            let chosen = run_options(estimate, shape);
+            reader.read(&table, |table| sensor::learn_run(table, facts, &chosen))
         }
         None => {
             let default = SensorOptions::default();
             let sensor_options = SensorOptions {
-                estimate: options.estimate(),
+                estimate,
                 distance_edges_m: shape.edges_m.unwrap_or(default.distance_edges_m),
                 distance_classes: shape.classes,
                 bearings_deg: shape.bearings_deg.unwrap_or(default.bearings_deg),
@@ -231,10 +272,10 @@ pub(crate) fn learn_sensor(
                 sensor: shape.sensor,
                 beam: shape.beam,
             };
-            sensor::learn_csv(&table, &sensor_options)
+            reader.read(&table, |table| sensor::learn_csv(table, &sensor_options))
         }
     });
-    Learned::from_sensor(&learned.map_err(|e| error::input_error(&e))?)
+    Learned::from_sensor(&learned?)
 }
 
 /// Returns the options for a recording, which knows what is left out of the shape.

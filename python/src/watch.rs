@@ -112,17 +112,22 @@ impl Watcher for SignalWatcher<'_> {
 #[derive(Debug, Default)]
 struct PolledWatcher<'a> {
     signals: SignalWatcher<'a>,
-    /// Runs that are done and all, which the calling thread has not reported yet.
-    runs: Mutex<Option<(u64, u64)>>,
+    /// Units of the work that are done and all, such as runs, which the calling thread has not reported yet.
+    units: Mutex<Option<(u64, u64)>>,
     is_over: AtomicBool,
     interrupt: Interrupt,
 }
 
 impl PolledWatcher<'_> {
+    /// Notes how many units of the work are done.
+    fn note(&self, done: u64, of: u64) {
+        *self.units.lock().unwrap_or_else(PoisonError::into_inner) = Some((done, of));
+    }
+
     /// Reports the progress since the last report.
     fn report(&self) {
-        let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner).take();
-        if let Some((done, of)) = runs {
+        let units = self.units.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some((done, of)) = units {
             self.signals.report(done, of);
         }
     }
@@ -140,7 +145,7 @@ impl PolledWatcher<'_> {
 impl Watcher for PolledWatcher<'_> {
     fn on_progress(&self, progress: Progress<'_>) {
         if let Progress::Runs { done, of, .. } = progress {
-            *self.runs.lock().unwrap_or_else(PoisonError::into_inner) = Some((done, of));
+            self.note(done, of);
         }
     }
 
@@ -202,6 +207,31 @@ pub(crate) fn run_reporting<T: Send>(
     py: Python<'_>,
     reporter: Option<&ProgressReporter>,
     work: impl FnOnce(&dyn Watcher) -> T + Send,
+) -> PyResult<T> {
+    run_watched(py, reporter, |watcher| work(watcher))
+}
+
+/// Does work in another thread that tells how many of its units are done, such as rows, and ends when it is answered false.
+///
+/// # Errors
+/// The exception of a signal, or of the function that is told.
+pub(crate) fn run_counting<T: Send>(
+    py: Python<'_>,
+    reporter: Option<&ProgressReporter>,
+    work: impl FnOnce(&(dyn Fn(u64, u64) -> bool + Sync)) -> T + Send,
+) -> PyResult<T> {
+    run_watched(py, reporter, |watcher| {
+        work(&|done, of| {
+            watcher.note(done, of);
+            watcher.should_continue()
+        })
+    })
+}
+
+fn run_watched<T: Send>(
+    py: Python<'_>,
+    reporter: Option<&ProgressReporter>,
+    work: impl FnOnce(&PolledWatcher<'_>) -> T + Send,
 ) -> PyResult<T> {
     let signals = SignalWatcher::new(reporter);
     let watcher = PolledWatcher { signals, ..PolledWatcher::default() };

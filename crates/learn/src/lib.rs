@@ -13,6 +13,7 @@ mod left_out;
 pub mod log_table;
 pub mod profile;
 mod track;
+pub mod watched_table;
 
 #[cfg(test)]
 mod oracle;

@@ -75,6 +75,8 @@ fn run_all(page: &Path) -> usize {
 const PICTURES: &str = "docs/src/pictures";
 /// The picture of the studio's page, which needs a browser.
 const OF_THE_STUDIO: &str = "studio";
+/// Pictures of measurements that take too long for a test, with the script of the page that makes each.
+const OF_SCRIPTS: [(&str, &str); 1] = [("learning", "python/benches/scores.py")];
 /// Largest difference of a color of two pixels that look alike, of 255.
 const MAX_DIFFERENCE: u8 = 24;
 /// Largest share of pixels of a picture that may look different, as letters of another version do.
@@ -151,7 +153,11 @@ fn every_picture_is_made_by_a_command_of_a_page_that_shows_it() {
     for entry in std::fs::read_dir(root().join(PICTURES)).expect("the pictures") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
-        if name != OF_THE_STUDIO {
+        if let Some((_, script)) = OF_SCRIPTS.iter().find(|(picture, _)| *picture == name) {
+            let makes = |line: &str| line.contains(script) && line.contains(&format!("{name}.png"));
+            let is_one = |text: &String| pictures(text).contains(&name) && text.lines().any(makes);
+            assert!(texts.iter().any(is_one), "{name}: no page shows it and names {script}");
+        } else if name != OF_THE_STUDIO {
             assert!(is_made(&name), "{name}: no page shows it beside the command that makes it");
             checked += 1;
         }

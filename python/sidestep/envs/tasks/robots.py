@@ -93,7 +93,8 @@ def goal(setting: Setting) -> list[Feature]:
 def in_own_frame(offset: NDArray[Any], heading: NDArray[Any]) -> NDArray[Any]:
     """Returns offsets in columns and rows as boxes ahead and to the left."""
     ahead = STEPS[heading]
-    forward = (offset * ahead).sum(axis=1)
+    # Column by column: NumPy's sums over an axis of two cost ten times as much.
+    forward = ahead[:, 0] * offset[:, 0] + ahead[:, 1] * offset[:, 1]
     left = ahead[:, 0] * offset[:, 1] - ahead[:, 1] * offset[:, 0]
     return np.stack([forward, left], axis=1)
 
@@ -136,21 +137,27 @@ Region = tuple[int, int, int, int]
 
 
 def _inside(boxes: NDArray[Any], region: Region) -> NDArray[np.bool_]:
-    col, row, width, height = region
-    return np.asarray(((boxes >= (col, row)) & (boxes < (col + width, row + height))).all(axis=1))
+    first_col, first_row, width, height = region
+    cols, rows = boxes[:, 0], boxes[:, 1]
+    is_in_cols = (cols >= first_col) & (cols < first_col + width)
+    return np.asarray(is_in_cols & (rows >= first_row) & (rows < first_row + height))
+
+
+def _same_box(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.asarray((a[:, 0] == b[:, 0]) & (a[:, 1] == b[:, 1]))
 
 
 def _has_new_goal(before: Arrays, after: Arrays) -> NDArray[np.bool_]:
-    return np.asarray((before["goal_boxes"] != after["goal_boxes"]).any(axis=1))
+    return ~_same_box(before["goal_boxes"], after["goal_boxes"])
 
 
 def _reached(regions: list[Region], before: Arrays, after: Arrays) -> NDArray[np.bool_]:
     """Returns who has come to its goal: to the very box, or into the region of its trip and now has a goal in another one."""
     old, new, at = before["goal_boxes"], after["goal_boxes"], after["at_boxes"]
-    is_there = (at == old).all(axis=1)
+    is_there = _same_box(at, old)
     for region in regions:
         is_there |= _inside(at, region) & _inside(old, region) & ~_inside(new, region)
-    return np.asarray(is_there & _has_new_goal(before, after) & (old[:, 0] >= 0))
+    return np.asarray(is_there & ~_same_box(old, new) & (old[:, 0] >= 0))
 
 
 def _measure_goal(regions: list[Region], before: Arrays, after: Arrays) -> NDArray[Any]:
