@@ -6,6 +6,7 @@
 
 use super::beam::BeamModel;
 use super::ray::reaches;
+use serde::{Deserialize, Serialize};
 
 /// Index of the observation `nothing`, always the first.
 pub const NOTHING: u8 = 0;
@@ -19,7 +20,7 @@ pub const FREE: u8 = 0;
 pub const WALL: u8 = 1;
 
 /// One beam's report: an observation of its sensor and a distance class.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Reading {
     /// Index into the sensor's observations; 0 is `nothing`.
     pub observation: u8,

@@ -10,7 +10,7 @@
 //! messenger.rs       a peer's reliable and best-effort messages to and from all other peers
 //! agent.rs           the interface of an agent's program, of its percepts, controls and packets
 //! distributed.rs     the interface of a world whose agents are processes
-//! worlds.rs          the worlds that have it: airspace.rs (pilots), chain.rs (connectors)
+//! worlds.rs          the worlds that have it: airspace.rs (pilots), chain.rs (connectors), robots.rs
 //! faults.rs          the faults of the scenario's network, for the packets of one agent
 //! recent_senders.rs  the senders that an agent has heard lately
 //! replay_window.rs   which frames of a peer have arrived
@@ -35,6 +35,7 @@ pub mod program;
 pub mod protocol;
 mod recent_senders;
 mod replay_window;
+mod robots;
 pub mod server;
 pub mod signature;
 pub mod wire;

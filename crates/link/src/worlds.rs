@@ -4,9 +4,10 @@ use crate::airspace::DistributedAirspace;
 use crate::chain::DistributedChains;
 use crate::distributed::DistributedWorld;
 use crate::protocol::ScenarioFingerprint;
+use crate::robots::DistributedRobots;
 use sidestep::kernel::{Digest, InputError};
 use sidestep::scenario::{CompiledScenario, Source};
-use sidestep::worlds::{airspace, chain};
+use sidestep::worlds::{airspace, chain, robots};
 use std::sync::Arc;
 
 /// Returns the fingerprint of a scenario: of its text, with all changes, and of all files to which it refers.
@@ -37,18 +38,32 @@ pub fn distributed_world(
     source: &Source,
 ) -> Result<Arc<dyn DistributedWorld>, InputError> {
     let compiled_world = compiled.as_any();
-    let world: Result<Arc<dyn DistributedWorld>, (&str, &str)> = if let Some(airspace) =
+    let world: Result<Arc<dyn DistributedWorld>, (String, String)> = if let Some(airspace) =
         compiled_world.downcast_ref::<airspace::scenario::CompiledAirspace>()
     {
-        DistributedAirspace::new(airspace.world.clone()).map(|world| Arc::new(world) as _)
+        shared(DistributedAirspace::new(airspace.world.clone()))
     } else if let Some(plane) = compiled_world.downcast_ref::<chain::scenario::ChainScenario<2>>() {
-        DistributedChains::new(plane.world.clone()).map(|world| Arc::new(world) as _)
+        shared(DistributedChains::new(plane.world.clone()))
     } else if let Some(space) = compiled_world.downcast_ref::<chain::scenario::ChainScenario<3>>() {
-        DistributedChains::new(space.world.clone()).map(|world| Arc::new(world) as _)
+        shared(DistributedChains::new(space.world.clone()))
+    } else if let Some(building) =
+        compiled_world.downcast_ref::<robots::scenario::Compiled>()
+    {
+        shared(DistributedRobots::new(building.world.clone()))
     } else {
         let cause = format!("agents of the world `{}` decide in one process", compiled.world());
-        let remedy = "give a scenario with world = \"airspace\" or world = \"chain\"";
+        let remedy = "give a scenario with world = \"airspace\", \"chain\" or \"robots\"";
         return Err(InputError::new(&source.place, cause, remedy));
     };
     world.map_err(|(cause, remedy)| InputError::new(&source.place, cause, remedy))
+}
+
+/// Returns one of the worlds as any of them, or why its agents cannot be nodes: the cause and the remedy.
+fn shared<W: DistributedWorld + 'static>(
+    world: Result<W, (impl Into<String>, impl Into<String>)>,
+) -> Result<Arc<dyn DistributedWorld>, (String, String)> {
+    match world {
+        Ok(world) => Ok(Arc::new(world)),
+        Err((cause, remedy)) => Err((cause.into(), remedy.into())),
+    }
 }

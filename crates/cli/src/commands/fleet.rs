@@ -30,6 +30,7 @@ Examples:
   sidestep fleet chain.toml --set chain.deployment=team
                                            a process for each connector; where all
                                            rules are local: see the book
+  sidestep fleet office.toml --watch       a process for each robot
 
 The program sidestep-link does it: `cargo install --path crates/link`. In lockstep a fleet comes \
 out as `sidestep run` does, bit for bit. Ctrl-C ends all of its processes; a fleet in lockstep \
@@ -41,7 +42,8 @@ whatever ends it, and is not continued.";
 enum ClockArg {
     /// The server waits for every agent: the same results as in one process
     Lockstep,
-    /// Each cycle is a deadline: a late airplane stays on its orbit, a late chain stands still
+    /// Each cycle is a deadline: a late airplane stays on its orbit, a late chain or robot stands
+    /// still
     Realtime,
 }
 
@@ -56,7 +58,7 @@ enum TopologyArg {
     Multicast,
 }
 
-/// Run a scenario with a process for each airplane, or for each connector of a chain.
+/// Run a scenario with a process for each airplane, for each connector of a chain, or for each robot.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct FleetArgs {

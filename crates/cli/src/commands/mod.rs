@@ -48,9 +48,9 @@ pub(crate) enum Command {
     Run(run::RunArgs),
     /// Watch, steer, replay and edit in the browser
     Studio(studio::StudioArgs),
-    /// Run a scenario with a process for each airplane or connector
+    /// Run a scenario with a process for each airplane, connector or robot
     Fleet(Box<fleet::FleetArgs>),
-    /// Run one airplane or connector of a fleet on this machine
+    /// Run one airplane, connector or robot of a fleet on this machine
     Node(Box<node::NodeArgs>),
     /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),

@@ -18,6 +18,7 @@ Examples:
   sidestep node chain.toml --connector 0.3 --connect tcp/10.0.0.1:7600 \\
       --listen tcp/10.0.0.4:0 --insecure
                                    connector 3 of chain 0
+  sidestep node office.toml --robot 2 --connect tcp/10.0.0.1:7600 --insecure
 
 Give it the scenario, --set, --seed and --cycles of the fleet, and on a network that you do not trust certificates in place of --insecure. It runs its agent until the fleet \
 ends. When it has not heard the server for the time of --lease, it ends in lockstep; in real time \
@@ -25,13 +26,15 @@ it waits for another minute, and takes its place again when the server is back."
 
 const USAGE: &str = "\
 sidestep node <SCENARIO> --airplane <ID> --connect <ENDPOINT> [OPTIONS]
-       sidestep node <SCENARIO> --connector <CHAIN.K> --connect <ENDPOINT>";
+       sidestep node <SCENARIO> --connector <CHAIN.K> --connect <ENDPOINT>
+       sidestep node <SCENARIO> --robot <ID> --connect <ENDPOINT>";
 
 /// The nouns of agents, which are the options that select them.
 const AIRPLANE: &str = "airplane";
 const CONNECTOR: &str = "connector";
+const ROBOT: &str = "robot";
 
-/// Run one airplane or connector of a fleet on this machine.
+/// Run one airplane, connector or robot of a fleet on this machine.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES, override_usage = USAGE)]
 #[command(group = ArgGroup::new("agent").required(true))]
@@ -46,6 +49,10 @@ pub(crate) struct NodeArgs {
     /// Chain and number of the connector in it, both from 0, e.g. 0.3
     #[arg(long, value_name = "CHAIN.K", group = "agent", value_parser = connector)]
     connector: Option<AgentName>,
+
+    /// Id of the robot, from 0
+    #[arg(long, value_name = "ID", group = "agent")]
+    robot: Option<EntityId>,
 
     /// Endpoint of the server, e.g. tcp/10.0.0.1:7600; repeatable, if it may be at several
     #[arg(long, value_name = "ENDPOINT", required = true)]
@@ -75,7 +82,9 @@ fn connector(text: &str) -> Result<AgentName, String> {
 impl NodeArgs {
     fn agent(&self) -> AgentName {
         let airplane = self.airplane.map(|id| AgentName::new(AIRPLANE, id, None));
-        airplane.or_else(|| self.connector.clone()).expect("the command line has one of them")
+        let robot = self.robot.map(|id| AgentName::new(ROBOT, id, None));
+        let given = airplane.or(robot).or_else(|| self.connector.clone());
+        given.expect("the command line has one of them")
     }
 }
 
@@ -94,7 +103,7 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
     run_job(&Job::Node(job), |_| {})?;
     let agent = args.agent();
     let result = match agent.part {
-        None => json!({ "airplane": agent.number }),
+        None => json!({ agent.noun: agent.number }),
         Some(connector) => json!({ "chain": agent.number, "connector": connector }),
     };
     console.print_result_or_short(&result, "", || {

@@ -33,6 +33,7 @@ use super::effector::{LEFT, RIGHT, Side};
 use super::sensor::{NOTHING, Reading};
 pub use sidestep_error_models::RandomPolicy;
 use sidestep_kernel::stream::Draws;
+use serde::{Deserialize, Serialize};
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_map::planning::FlowField;
 use std::cmp::Ordering;
@@ -46,7 +47,7 @@ pub struct Memory {
 }
 
 /// The obstacle that stopped the last action.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Contact {
     /// Kind of the obstacle, an index into the scenario's kinds.
     pub kind: u8,
@@ -55,7 +56,7 @@ pub struct Contact {
 }
 
 /// A message heard over the radio.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReceivedMessage {
     /// Id of the robot that sent it.
     pub sender: EntityId,
@@ -118,7 +119,7 @@ pub struct Percept<'a> {
     pub heard: &'a [ReceivedMessage],
 }
 
-/// Returns the nearest class reported in each sector, for percepts that are made by hand.
+/// Returns the nearest class reported in each sector, for percepts that are made outside of a run.
 pub fn nearest_by_sector(readings: &[Reading], sectors: &[Sector]) -> [u8; 4] {
     let mut nearest = [UNSEEN; 4];
     for (reading, &sector) in readings.iter().zip(sectors) {
@@ -154,7 +155,7 @@ fn random_turn(draws: &mut Draws) -> ActionId {
 }
 
 /// A mark on the path of a robot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TripEvent {
     /// The robot is where its trips start; time counts from here.
     Started,

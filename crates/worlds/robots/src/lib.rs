@@ -9,6 +9,7 @@
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
 //! plan.rs: before a cycle, the planners of teams (team.rs)      action_progress.rs, long_action.rs: actions of several cycles
 //! errands.rs: the tasks of teams
+//! agents.rs: a robot's program outside of a run      remote_agents.rs: its percepts, and the controls that a run takes
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio          watch/: who comes nearer to its goal, and gridlocks
 //! ```
@@ -16,6 +17,7 @@
 mod act;
 mod action;
 mod action_progress;
+pub mod agents;
 mod alias_table;
 mod auction;
 mod audit;
@@ -51,6 +53,7 @@ pub mod progress;
 mod purpose;
 mod ranges;
 mod remarks;
+mod remote_agents;
 mod reports;
 pub mod rows;
 pub mod scenario;
@@ -220,6 +223,8 @@ pub struct Scratch {
     sensor_samples: Vec<SensorSample>,
     range_samples: Vec<RangeSample>,
     motion_samples: Vec<MotionSample>,
+    /// The percepts of robots in their order of deciding, where these decide outside of the run.
+    percept_log: Option<Vec<agents::RobotPercept>>,
 }
 
 impl Phases for RobotsWorld {

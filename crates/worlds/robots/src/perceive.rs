@@ -2,11 +2,13 @@
 //! that they may come to cover.
 
 use super::action::SweptVolume;
+use super::agents::RobotPercept;
 use super::alias_table::RowIndex;
 use super::cycle_context::{CycleContext, are_free, box_index};
 use super::decide::{Decision, Memory, Percept, ReceivedMessage, Sector, TripEvent, UNSEEN};
 use super::purpose;
 use super::ranges::{RangeReadings, RangeSensor};
+use super::remote_agents::SubmittedControls;
 use super::sensor::Reading;
 use super::state::{BodyState, Facing, Intent, PackedPose};
 use super::world::{BeamBoxes, Door, MountedSensor, Mover, Radio, RobotModel, Role};
@@ -73,6 +75,10 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     ) -> (Decision, Memory) {
         let body = self.body(slot);
         let nearest = self.fill_percept(model, slot, scratch);
+        let mut memory = memory_of(body);
+        if let Some(controls) = self.submitted_controls(model) {
+            return controls.decision(body.id, memory);
+        }
         let percept = Percept {
             now: self.now,
             id: body.id,
@@ -84,7 +90,9 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             heading: body.facing.get().heading(),
             heard: &scratch.heard,
         };
-        let mut memory = memory_of(body);
+        if let Some(log) = scratch.percept_log.as_mut().filter(|_| !model.is_external) {
+            log.push(RobotPercept::new(&percept, memory));
+        }
         let mut draws = self.world.streams.draws(body.id, self.now, purpose::DECIDE);
         let decision = model.behaviour.decide(&percept, &mut memory, &mut draws);
         (decision, memory)
@@ -96,7 +104,8 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     #[inline(always)]
     fn fill_percept(&self, model: &RobotModel, slot: EntitySlot, scratch: &mut Scratch) -> [u8; 4] {
         scratch.heard.clear();
-        if model.is_external && !scratch.keep_readings {
+        let is_decided_outside = model.is_external || self.submitted_controls(model).is_some();
+        if is_decided_outside && !scratch.keep_readings {
             scratch.readings.clear();
             return [UNSEEN; 4];
         }
@@ -105,6 +114,13 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             self.listen(radio, slot, &mut scratch.heard);
         }
         nearest
+    }
+
+    /// Returns the controls of this cycle if robots of this type decide outside of the run in it. Those that follow the
+    /// orders of a caller carry them out in any cycle.
+    #[inline(always)]
+    fn submitted_controls(&self, model: &RobotModel) -> Option<&SubmittedControls> {
+        self.state.submitted.of_cycle(self.now).filter(|_| !model.is_external)
     }
 
     /// Records the parts of a decision beside the action: trips and broadcasts.

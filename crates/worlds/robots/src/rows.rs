@@ -175,6 +175,11 @@ impl Collector {
         }
     }
 
+    /// Returns whether controls from outside of the run are to be kept.
+    pub(super) fn records_controls(&self) -> bool {
+        self.record.controls
+    }
+
     /// Starts to keep the events that frames report.
     pub(super) fn watch(&mut self) {
         self.log.is_enabled = true;

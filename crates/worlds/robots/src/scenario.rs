@@ -559,6 +559,8 @@ pub struct RecordSection {
     pub events: bool,
     /// True and reported reading of every beam, and the result of every action: logs to learn from.
     pub calibration: bool,
+    /// Controls of robots whose agents are processes of their own.
+    pub controls: bool,
     /// Number of cycles between two checkpoints.
     pub checkpoint_every: u64,
     /// Cycles between two rows of the metrics over time, 0 for none; if left out, one that gives a run a thousand rows.
@@ -571,6 +573,7 @@ impl Default for RecordSection {
             trajectories: true,
             events: true,
             calibration: false,
+            controls: false,
             checkpoint_every: 10_000,
             series_every: None,
         }

@@ -7,6 +7,7 @@ use super::broadcast::BroadcastBuffer;
 use super::delay::DelayColumns;
 use super::policy::ConflictPolicy;
 use super::progress::Progress;
+use super::remote_agents::SubmittedControls;
 use super::sensor::{FREE, WALL};
 use super::team::TeamState;
 use super::world::{Body, BodyType, RobotsWorld};
@@ -54,6 +55,8 @@ pub struct RobotsState {
     pub(crate) planner_teams: Box<[TeamState]>,
     /// Last broadcast of each robot; empty without radio.
     pub(crate) voices: BroadcastBuffer,
+    /// The controls of robots that have decided outside of the run. They are those of one cycle, so no snapshot has them.
+    pub(crate) submitted: SubmittedControls,
     /// Poses at the start of each cycle, while a run is recorded.
     pub(crate) frames: Option<PoseBuffer>,
     /// Which robots come nearer to their goals; no cycle reads it.
@@ -201,6 +204,7 @@ impl RobotsState {
             action_progress: ProgressColumns::new(if world.has_long_actions { n } else { 0 }),
             planner_teams: world.new_team_states(),
             voices: BroadcastBuffer::new(if world.radio.is_some() { n } else { 0 }),
+            submitted: SubmittedControls::default(),
             frames: None,
             progress: Progress::default(),
             waits: AtomicColumn::filled(world.waits_len(), 0),
@@ -224,6 +228,7 @@ impl RobotsState {
             action_progress: self.action_progress.clone(),
             planner_teams: self.planner_teams.iter().map(TeamState::trial_copy).collect(),
             voices: self.voices.clone(),
+            submitted: self.submitted.clone(),
             frames: None,
             progress: Progress::default(),
             waits: self.waits.clone(),

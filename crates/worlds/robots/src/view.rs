@@ -6,7 +6,7 @@ use super::odometry::DeadReckoning;
 use super::progress::GridlockEvent;
 use super::sensor::{NOTHING, Reading, SensorModel};
 use super::state::{BodyState, LastContact, RobotsState};
-use super::world::{BodyType, MountedSensor, Role};
+use super::world::{BodyType, CYCLE_S, MountedSensor, Role};
 use super::{Event, EventKind, RobotsEvent, RobotsWorld, Scratch};
 use crate::kinds;
 use sidestep_kernel::math::{cos, sin};
@@ -19,8 +19,6 @@ use sidestep_kernel::{Cycle, EntityId, Phases};
 use sidestep_map::Rect;
 use std::f64::consts::FRAC_PI_2;
 
-/// Length of a cycle in seconds for pictures; a scenario gives none, because the model counts cycles only.
-pub(super) const CYCLE_S: f64 = 1.0;
 /// Number of cycles worth showing as trails: longer ones cover the floor.
 const TRAIL_CYCLES: Cycle = 400;
 

@@ -23,6 +23,10 @@ use sidestep_map::{GridMap, Rect};
 use std::ops::Range;
 use std::sync::Arc;
 
+/// Length of a cycle in seconds, for pictures and for clocks of fleets: a scenario gives none, because the model counts
+/// cycles only.
+pub const CYCLE_S: f64 = 1.0;
+
 /// Boxes of a beam that are read together, even past a wall: four loads and one branch cost less than a branch
 /// after each load.
 pub(super) const BEAM_CHUNK_BOXES: usize = 4;

@@ -6,12 +6,11 @@ use super::progress::{CHECK_CYCLES, Progress};
 use super::rows::Collector;
 use super::scenario::{Behaviours, Compiled, StorageOrder};
 use super::state::{BodyRecord, Facing, LastContact, RobotsState, Snapshot};
-use super::view::CYCLE_S;
-use super::world::RobotsWorld;
+use super::world::{CYCLE_S, RobotsWorld};
 use super::{Scratch, text};
 use serde_json::{Value, json};
 use sidestep_kernel::checkpoint::CheckpointError;
-use sidestep_kernel::control::{AgentTeams, BufferMut, Order};
+use sidestep_kernel::control::{AgentTeams, BufferMut, Order, OrderError};
 use sidestep_kernel::digest::Hasher;
 use sidestep_kernel::ports::{RecordError, Recorder, TableSchema};
 use sidestep_kernel::text::{JsonTextReport, KeyValues};
@@ -19,7 +18,7 @@ use sidestep_kernel::view::{
     BodyId, Frame, FrameOptions, GridTeam, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
-    CheckpointableWorld, ControllableWorld, Cycle, Digest, InputError, RecordableWorld, Run,
+    CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld, Run,
     RunConfig, RunInputs, RunStats, World, WorldMetrics, WorldView,
 };
 use sidestep_scenario::{Source, metric_label};
@@ -248,6 +247,19 @@ impl ControllableWorld for RobotsWorld {
 
     fn order(&self, state: &mut RobotsState, order: &Order<'_>) {
         self.record_order(state, order);
+    }
+
+    fn submit_controls(
+        &self,
+        state: &mut RobotsState,
+        now: Cycle,
+        controls: &[(EntityId, Vec<u8>)],
+    ) -> Result<(), OrderError> {
+        self.store_controls(state, now, controls)
+    }
+
+    fn records_controls(&self, collector: &Collector) -> bool {
+        collector.records_controls()
     }
 
     fn observe(&self, state: &RobotsState, now: Cycle, team: usize, buffers: &mut [BufferMut<'_>]) {
