@@ -23,12 +23,14 @@ from ._errors import (
     CheckpointError,
     ClosedError,
     EngineError,
+    FleetError,
     InputError,
     OrderError,
     RecordError,
     ReplayError,
     SidestepError,
 )
+from ._fleet import Fleet, FleetStatus, NodeStatus
 from ._inspect import Finding, ImportReport, inspect
 from ._native import (
     Arm,
@@ -61,9 +63,13 @@ __all__ = [
     "EngineError",
     "Finding",
     "FkResult",
+    "Fleet",
+    "FleetError",
+    "FleetStatus",
     "IkResult",
     "ImportReport",
     "InputError",
+    "NodeStatus",
     "OrderError",
     "RecordError",
     "ReplayError",

@@ -61,6 +61,10 @@ class EngineError(SidestepError, RuntimeError):
     """An executor that cannot run the tasks of a sweep; finished runs are kept, and the same call continues."""
 
 
+class FleetError(SidestepError, RuntimeError):
+    """A fleet that could not go on: a node or the server is lost, or the program of the network fails."""
+
+
 class ClosedError(SidestepError, RuntimeError):
     """Use of a closed simulation."""
 

@@ -30,6 +30,7 @@ mod choice;
 mod collectives;
 mod columns;
 mod error;
+mod fleet;
 mod inspect;
 mod json;
 mod learn;
@@ -89,6 +90,8 @@ fn add_simulation(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 fn add_sweeps(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(fleet::build, module)?)?;
+    module.add_function(wrap_pyfunction!(fleet::has_loopback_multicast, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::compare_methods, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::run_sweep, module)?)?;
     module.add_function(wrap_pyfunction!(sweep::run_task, module)?)?;

@@ -21,13 +21,14 @@ macro_rules! shipped {
 }
 
 /// The scenarios, world by world, those that show the most first.
-pub(crate) static SHIPPED: [ShippedScenario; 25] = [
+pub(crate) static SHIPPED: [ShippedScenario; 26] = [
     shipped!("robots/office"),
     shipped!("robots/crossing"),
     shipped!("robots/corridor"),
     shipped!("robots/planner"),
     shipped!("robots/radio"),
     shipped!("robots/one-robot"),
+    shipped!("robots/fleet"),
     shipped!("chain/serpentine"),
     shipped!("chain/snake3d"),
     shipped!("chain/arm", "chain" / "arm.urdf"),

@@ -72,7 +72,23 @@ fn the_shipped_chains_run_as_processes_with_the_digest_of_a_run_and_an_ordinary_
 }
 
 #[test]
-fn a_node_is_told_its_airplane_or_its_connector_and_not_both() {
+fn the_shipped_robots_run_as_processes_with_the_digest_of_a_run_and_an_ordinary_folder() {
+    if !is_there() {
+        return;
+    }
+    let place = place();
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/robots/fleet.toml");
+    let alone = place.json(&["run", scenario]);
+    let fleet = place.json(&["fleet", scenario, "--out", "r"]);
+    assert_eq!(fleet["digest"], alone["digest"]);
+    let nodes = fleet["fleet"]["nodes"].as_array().expect("nodes");
+    assert_eq!((nodes.len(), &nodes[4]["name"]), (6, &json!("4")));
+    assert_eq!(place.json(&["replay", "r"])["digest"], alone["digest"]);
+    assert_eq!(place.run(&["report", "r"]).code(), 0);
+}
+
+#[test]
+fn a_node_is_told_its_airplane_its_connector_or_its_robot_and_only_one_of_them() {
     let place = place();
     let node = |named: &[&str]| {
         let args = [&["node", "ring.toml", "--connect", "tcp/127.0.0.1:9"], named].concat();
@@ -81,8 +97,10 @@ fn a_node_is_told_its_airplane_or_its_connector_and_not_both() {
         ended.err()
     };
     let nobody = node(&[]);
-    assert!(nobody.contains("--airplane") && nobody.contains("--connector"), "{nobody}");
+    assert!(nobody.contains("--airplane") && nobody.contains("--robot"), "{nobody}");
+    assert!(nobody.contains("--connector"), "{nobody}");
     assert!(node(&["--airplane", "0", "--connector", "0.1"]).contains("cannot be used with"));
+    assert!(node(&["--airplane", "0", "--robot", "0"]).contains("cannot be used with"));
     let wrong = node(&["--connector", "3"]);
     assert!(wrong.contains("give the numbers of chain and connector, e.g. 0.3"), "{wrong}");
 }

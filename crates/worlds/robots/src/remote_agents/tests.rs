@@ -49,7 +49,7 @@ behaviour = { kind = "shuttle", a = [0, 0, 3, 8], b = [11, 0, 3, 8], avoidance =
 count = 2
 period = 3
 sensors = ["bumper-4"]
-behaviour = { kind = "random", weights_after_contact = { left = 1, right = 2 } }
+behaviour = { kind = "random", weights = { forward = 3, left = 1 }, weights_after_contact = { left = 1, right = 2 } }
 [[robots]]
 count = 2
 action_cycles = 2
@@ -253,7 +253,7 @@ fn controls_that_no_robot_can_carry_out_are_refused_as_a_whole_with_the_reason()
 #[test]
 fn a_robot_under_orders_has_no_program_and_takes_its_orders_also_where_others_decide_outside() {
     let text = MIXED.replace(
-        "{ kind = \"random\", weights_after_contact = { left = 1, right = 2 } }",
+        "{ kind = \"random\", weights = { forward = 3, left = 1 }, weights_after_contact = { left = 1, right = 2 } }",
         "{ kind = \"external\" }",
     );
     let ordered = |run: &mut RobotsRun| {
