@@ -369,8 +369,8 @@ def _scenario_file(
     if changes:
         compiled = compiled.set(changes)
     # As it is pickled: its text, with all changes, and the files to which it refers.
-    _, state = compiled.__reduce__()[:2]
-    text, files = state
+    packed: tuple[Any, tuple[str, list[tuple[str, bytes]]]] = compiled.__reduce__()  # type: ignore[assignment]
+    _, (text, files) = packed
     for name, content in files:
         file = folder / name
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -393,13 +393,13 @@ def _checked_float(name: str, value: float, low: float, high: float) -> float:
 
 
 def _status(status: dict[str, Any]) -> FleetStatus:
-    nodes = [_of(NodeStatus, node) for node in status["nodes"]]
-    return _of(FleetStatus, {**status, "nodes": nodes})
+    nodes = [NodeStatus(**_fields(NodeStatus, node)) for node in status["nodes"]]
+    return FleetStatus(**{**_fields(FleetStatus, status), "nodes": nodes})
 
 
-def _of(kind: type[Any], values: Mapping[str, Any]) -> Any:
-    """Returns an object of a data class by those of the values that are its fields."""
-    return kind(**{field.name: values[field.name] for field in fields(kind)})
+def _fields(kind: type[Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns those of the values that are fields of a data class."""
+    return {field.name: values[field.name] for field in fields(kind)}
 
 
 def _read_messages(lines: Any, messages: queue.SimpleQueue[dict[str, Any] | None]) -> None:

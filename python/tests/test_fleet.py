@@ -131,7 +131,9 @@ def test_a_server_that_is_killed_is_an_error():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are looked for in /proc")
-@pytest.mark.parametrize("ending", ["os.kill(os.getpid(), signal.SIGKILL)", "del fleet, status", "os.fork() or time.sleep(600)"])
+@pytest.mark.parametrize(
+    "ending", ["os.kill(os.getpid(), signal.SIGKILL)", "del fleet, status", "os.fork() or time.sleep(600)"]
+)
 def test_no_process_is_left_when_its_driver_is_gone_or_has_dropped_it(ending):
     program = f"""
         import os, signal, sidestep, sys, time
@@ -144,7 +146,11 @@ def test_no_process_is_left_when_its_driver_is_gone_or_has_dropped_it(ending):
         sys.stdin.read()
     """
     driver = subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, "-c", textwrap.dedent(program)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     )
     try:
         nodes = [int(word) for word in driver.stdout.readline().split()]

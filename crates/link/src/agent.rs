@@ -4,6 +4,7 @@
 use crate::protocol::CycleStart;
 pub use sidestep::kernel::network::OutgoingPacket;
 use sidestep::kernel::{Cycle, EntityId};
+use std::time::Duration;
 
 /// Controls of agents in the form that their world reads, at most one of each.
 pub type SerializedControls = Vec<(EntityId, Vec<u8>)>;
@@ -75,6 +76,14 @@ pub trait AgentProgram: Send {
 
     /// Returns counts of packets that it has dropped, by reason.
     fn drop_counts(&self) -> Vec<(String, u64)>;
+
+    /// Returns the time after which it wants to be polled; none where only what the node receives makes it go on.
+    fn poll_interval(&self) -> Option<Duration> {
+        None
+    }
+
+    /// Receives what has come from elsewhere than the node, without waiting.
+    fn poll(&mut self) {}
 }
 
 /// A packet in transit to one receiver.

@@ -1,6 +1,7 @@
 //! A world whose agents may be processes: the interface that a server and its nodes use.
 
 use crate::agent::{AgentPercept, AgentProgram, ChannelModel, InvalidControl, SerializedControls};
+use crate::vehicle::VehiclePort;
 use sidestep::kernel::{EntityId, InputError, Simulation};
 use sidestep_session::fleet::AgentName;
 
@@ -67,6 +68,16 @@ pub trait DistributedWorld: Send + Sync {
 
     /// Returns the program of an agent, which accepts packets only from programs of the same build.
     fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram>;
+
+    /// Returns the program of an agent that a vehicle decides for, which is beyond a port; none where agents of this world
+    /// have no public messages.
+    fn vehicle_program(
+        &self,
+        _: EntityId,
+        _: Box<dyn VehiclePort>,
+    ) -> Option<Box<dyn AgentProgram>> {
+        None
+    }
 
     /// Returns the faults of the scenario's network for packets of an agent; none where it has no network.
     fn channel(&self, agent: EntityId) -> Option<Box<dyn ChannelModel>>;

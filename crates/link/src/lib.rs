@@ -16,6 +16,7 @@
 //! replay_window.rs   which frames of a peer have arrived
 //! hosted_run.rs      the recorded run at the server
 //! server/            the server of the world
+//! vehicle/           programs of users that decide in place of an agent's own, over a public wire
 //! node/              the node of an agent
 //! program/           the process: its job, logs, metrics and child processes
 //! ```
@@ -38,5 +39,6 @@ mod replay_window;
 mod robots;
 pub mod server;
 pub mod signature;
+mod vehicle;
 pub mod wire;
 pub mod worlds;

@@ -6,6 +6,7 @@ use crate::agent::{
 };
 use crate::distributed::DistributedWorld;
 use crate::protocol::CycleStart;
+use crate::vehicle::{RobotVehicle, VehiclePort};
 use sidestep::kernel::{Cycle, EntityId, Simulation, World};
 use sidestep::worlds::robots::agents::{RobotAgent, RobotControl, RobotPercept};
 use sidestep::worlds::robots::world::CYCLE_S;
@@ -27,8 +28,10 @@ impl DistributedRobots {
             return Err(("there is no robot".into(), "add a section [[robots]]".into()));
         }
         if let Some(robot) = world.find_external_robot() {
-            let cause = format!("robot {robot} follows the orders of a caller, and decides nothing");
-            let remedy = "give its section a behavior of its own, e.g. behaviour = { kind = \"wander\" }";
+            let cause =
+                format!("robot {robot} follows the orders of a caller, and decides nothing");
+            let remedy =
+                "give its section a behavior of its own, e.g. behaviour = { kind = \"wander\" }";
             return Err((cause, remedy.into()));
         }
         Ok(Self { world })
@@ -107,6 +110,14 @@ impl DistributedWorld for DistributedRobots {
 
     fn program(&self, agent: EntityId, _: &str) -> Box<dyn AgentProgram> {
         Box::new(RobotProgram { agent: self.agent(agent), control: None })
+    }
+
+    fn vehicle_program(
+        &self,
+        agent: EntityId,
+        port: Box<dyn VehiclePort>,
+    ) -> Option<Box<dyn AgentProgram>> {
+        Some(Box::new(RobotVehicle::new(self.world.clone(), agent, port)))
     }
 
     fn channel(&self, _: EntityId) -> Option<Box<dyn ChannelModel>> {

@@ -46,9 +46,7 @@ pub fn distributed_world(
         shared(DistributedChains::new(plane.world.clone()))
     } else if let Some(space) = compiled_world.downcast_ref::<chain::scenario::ChainScenario<3>>() {
         shared(DistributedChains::new(space.world.clone()))
-    } else if let Some(building) =
-        compiled_world.downcast_ref::<robots::scenario::Compiled>()
-    {
+    } else if let Some(building) = compiled_world.downcast_ref::<robots::scenario::Compiled>() {
         shared(DistributedRobots::new(building.world.clone()))
     } else {
         let cause = format!("agents of the world `{}` decide in one process", compiled.world());

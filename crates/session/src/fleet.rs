@@ -43,6 +43,8 @@ pub enum Job {
     Fleet(FleetJob),
     /// Run one agent of a fleet, whose server another process is.
     Node(NodeJob),
+    /// Run one agent of a fleet for which a vehicle decides.
+    Vehicle(VehicleJob),
     /// Watch a fleet that flies already.
     Watch(WatchJob),
 }
@@ -145,6 +147,15 @@ pub struct NodeJob {
     pub listen: Vec<String>,
     /// Time in seconds that it waits for the server.
     pub patience_s: f64,
+}
+
+/// Job of a node that hands its agent's percepts to a vehicle, a program of a user, and takes controls from there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VehicleJob {
+    /// The node.
+    pub node: NodeJob,
+    /// The endpoint at which the vehicle reaches it, e.g. `tcp/127.0.0.1:7700`; port 0 for any free one.
+    pub endpoint: String,
 }
 
 /// A watcher of a fleet, which takes no part in it.

@@ -7,7 +7,7 @@ use crate::scenario_args::ScenarioArgs;
 use clap::{ArgGroup, Args};
 use serde_json::json;
 use sidestep::kernel::EntityId;
-use sidestep_session::fleet::{AgentName, Job, NodeJob};
+use sidestep_session::fleet::{AgentName, Job, LinkMessage, NodeJob, VehicleJob};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -19,6 +19,8 @@ Examples:
       --listen tcp/10.0.0.4:0 --insecure
                                    connector 3 of chain 0
   sidestep node office.toml --robot 2 --connect tcp/10.0.0.1:7600 --insecure
+  sidestep node office.toml --robot 2 --connect tcp/127.0.0.1:7600 --vehicle tcp/127.0.0.1:7700
+                                   your own program decides: see examples/vehicle.py
 
 Give it the scenario, --set, --seed and --cycles of the fleet, and on a network that you do not trust certificates in place of --insecure. It runs its agent until the fleet \
 ends. When it has not heard the server for the time of --lease, it ends in lockstep; in real time \
@@ -62,6 +64,11 @@ pub(crate) struct NodeArgs {
     #[arg(long, value_name = "ENDPOINT")]
     listen: Vec<String>,
 
+    /// Let a vehicle decide: a program of yours that reaches this node at this endpoint, e.g.
+    /// tcp/127.0.0.1:7700; port 0 for any free one
+    #[arg(long, value_name = "ENDPOINT")]
+    vehicle: Option<String>,
+
     /// Seconds to wait for the server
     #[arg(long, value_name = "S", default_value_t = 30.0)]
     patience: f64,
@@ -100,7 +107,16 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
         listen: args.listen.clone(),
         patience_s: args.patience.clamp(0.1, 86_400.0),
     };
-    run_job(&Job::Node(job), |_| {})?;
+    let job = match args.vehicle.clone() {
+        None => Job::Node(job),
+        Some(endpoint) => Job::Vehicle(VehicleJob { node: job, endpoint }),
+    };
+    run_job(&job, |message| {
+        // Only a node with a vehicle listens for one.
+        if let LinkMessage::Listens(endpoints) = message {
+            console.note(format!("The vehicle connects to {}", endpoints.join(", ")));
+        }
+    })?;
     let agent = args.agent();
     let result = match agent.part {
         None => json!({ agent.noun: agent.number }),

@@ -188,7 +188,20 @@ macro_rules! number {
     )*};
 }
 
-number!(f32, f64, i32, u32);
+number!(f32, f64, i8, i32, u8, u32, u64);
+
+impl Cdr for bool {
+    const MIN_BYTES: usize = 1;
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
+        // Programs write 1; any other number but 0 means the same to them.
+        u8::read(reader).map(|byte| byte != 0)
+    }
+
+    fn write(&self, writer: &mut Writer) {
+        u8::from(*self).write(writer);
+    }
+}
 
 impl Cdr for String {
     const MIN_BYTES: usize = 4;
@@ -250,7 +263,8 @@ impl<T: Cdr + Copy + Default, const N: usize> Cdr for [T; N] {
 }
 
 /// Declares a message by its fields, in their order in ROS.
-macro_rules! message {
+#[macro_export]
+macro_rules! cdr_message {
     ($(#[$doc:meta])* $name:ident { $($(#[$of:meta])* $field:ident: $type:ty),* $(,)? }) => {
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq)]
@@ -258,22 +272,24 @@ macro_rules! message {
             $($(#[$of])* pub $field: $type),*
         }
 
-        impl Cdr for $name {
-            const MIN_BYTES: usize = 0 $(+ <$type as Cdr>::MIN_BYTES)*;
+        impl $crate::bag::cdr::Cdr for $name {
+            const MIN_BYTES: usize = 0 $(+ <$type as $crate::bag::cdr::Cdr>::MIN_BYTES)*;
 
-            fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
-                $(let $field = Cdr::read(reader)?;)*
+            fn read(
+                reader: &mut $crate::bag::cdr::Reader<'_>,
+            ) -> Result<Self, $crate::bag::cdr::CdrError> {
+                $(let $field = $crate::bag::cdr::Cdr::read(reader)?;)*
                 Ok(Self { $($field),* })
             }
 
-            fn write(&self, writer: &mut Writer) {
-                $(self.$field.write(writer);)*
+            fn write(&self, writer: &mut $crate::bag::cdr::Writer) {
+                $($crate::bag::cdr::Cdr::write(&self.$field, writer);)*
             }
         }
     };
 }
 
-pub(super) use message;
+pub(super) use cdr_message as message;
 
 #[cfg(test)]
 #[allow(unreachable_pub, reason = "messages are public wherever they are declared")]

@@ -192,11 +192,13 @@ impl Node {
                 return Err(NodeError::Interrupted);
             }
             let max_wait = self.cycle.as_ref().and_then(|cycle| cycle.max_wait(&*self.program));
-            let wait = max_wait.map_or(POLL_INTERVAL, |wait| wait.min(POLL_INTERVAL));
+            let poll_interval = self.program.poll_interval();
+            let wait = max_wait.into_iter().chain(poll_interval).fold(POLL_INTERVAL, Duration::min);
             let Some(received) = self.receive_all(wait)? else {
                 self.leave();
                 return Ok(());
             };
+            self.program.poll();
             self.advance();
             self.report_status();
             // If this process was stopped, messages have queued up meanwhile: they are received before the server counts

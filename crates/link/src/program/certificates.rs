@@ -52,7 +52,7 @@ pub(super) fn check_viewer_encryption(job: &WatchJob) -> Result<(), InputError> 
 ///
 /// # Errors
 /// With the first thing that is wrong.
-fn check_links<'a>(
+pub(super) fn check_links<'a>(
     endpoints: impl IntoIterator<Item = &'a String>,
     tls: Option<&Tls>,
     is_insecure: bool,

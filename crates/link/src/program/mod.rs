@@ -34,7 +34,7 @@ use parent_monitor::ParentMonitor;
 use sidestep::kernel::terminal::escape_controls;
 use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
-use sidestep_session::fleet::{CommonSettings, Job, JobError, LinkMessage};
+use sidestep_session::fleet::{CommonSettings, Job, JobError, LinkMessage, VehicleJob};
 use std::io::BufRead;
 use std::process::ExitCode;
 
@@ -99,7 +99,12 @@ fn run_job(job: Job) -> Result<(), Error> {
         }
         Job::Node(job) => {
             apply_common_settings(&job.common, job.connect.iter().chain(&job.listen))?;
-            node::run(&job, &ParentMonitor::watch_node())
+            node::run(&job, None, &ParentMonitor::watch_node())
+        }
+        Job::Vehicle(VehicleJob { node: job, endpoint }) => {
+            apply_common_settings(&job.common, job.connect.iter().chain(&job.listen))?;
+            certificates::check_links([&endpoint], None, job.common.is_insecure)?;
+            node::run(&job, Some(&endpoint), &ParentMonitor::watch_node())
         }
         Job::Watch(job) => {
             check_build(&job.build)?;

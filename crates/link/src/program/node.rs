@@ -3,12 +3,14 @@
 use super::certificates::{check_identity, check_names, credentials, with_signatures};
 use super::denials::DenialLog;
 use super::metrics::{MetricsExporter, node_metrics};
+use super::output::print_message;
 use super::parent_monitor::ParentMonitor;
 use super::scenario::Scenario;
 use crate::identity::CertificateName;
 use crate::messenger::Messenger;
 use crate::node::{JoinConfig, Node, NodeError, Seat, join};
 use crate::protocol::{JoinError, JoinRequest};
+use crate::vehicle::ZenohPort;
 use crate::wire::PeerId;
 use crate::wire::endpoint::{
     PortReservation, WireSetupError, check_reachable, host_and_port, reserve_port,
@@ -17,14 +19,18 @@ use crate::wire::zenoh::ZenohWire;
 use sidestep::kernel::InputError;
 use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
-use sidestep_session::fleet::NodeJob;
+use sidestep_session::fleet::{AgentName, LinkMessage, NodeJob};
 use std::time::Duration;
 
-/// Runs one agent until the server ends the fleet.
+/// Runs one agent until the server ends the fleet. Where there is an endpoint for its vehicle, that decides.
 ///
 /// # Errors
 /// When anything is wrong with the job, or the server is gone.
-pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
+pub(super) fn run(
+    job: &NodeJob,
+    vehicle: Option<&String>,
+    monitor: &ParentMonitor,
+) -> Result<(), Error> {
     job.connect.iter().try_for_each(|at| host_and_port(at).map(drop)).map_err(endpoint_error)?;
     job.listen.iter().try_for_each(|at| check_reachable(at)).map_err(endpoint_error)?;
     let scenario = Scenario::read(&job.common.flown)?;
@@ -39,6 +45,7 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
         .map(|endpoint| reserve_port(endpoint))
         .collect::<Result<_, _>>()
         .map_err(endpoint_error)?;
+    let port = vehicle.map(|endpoint| serve_vehicle(&job.agent, endpoint)).transpose()?;
     let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
     let timeout = Duration::from_secs_f64(job.patience_s);
     let build = WORLDS.build();
@@ -71,7 +78,20 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
     let scenario = scenario.with_overrides(&welcome.overrides).inspect_err(|error| {
         seat.leave(&error.to_string());
     })?;
-    let program = scenario.world.program(agent, build);
+    let program = match port {
+        None => Some(scenario.world.program(agent, build)),
+        Some(port) => scenario.world.vehicle_program(agent, Box::new(port)),
+    };
+    let program = program.ok_or_else(|| {
+        seat.leave("agents of its world have no vehicles");
+        let noun = &job.agent.noun;
+        let cause = format!("there are no public messages for an agent of the kind `{noun}`");
+        InputError::new(
+            "--vehicle",
+            cause,
+            "give it for robots; without it the node decides itself",
+        )
+    })?;
     let channel = scenario.world.channel(agent);
     let name = job.agent.clone();
     tracing::info!(agent, who = format!("{} {name}", name.noun), "joined");
@@ -84,6 +104,17 @@ pub(super) fn run(job: &NodeJob, monitor: &ParentMonitor) -> Result<(), Error> {
         })
         .with_interrupt(move || interrupt.has_ended());
     node.run().map(drop).map_err(|e| node_error(e, job))
+}
+
+/// Serves the vehicle of an agent, and says where.
+fn serve_vehicle(agent: &AgentName, endpoint: &str) -> Result<ZenohPort, Error> {
+    let reserved = reserve_port(endpoint).map_err(endpoint_error)?;
+    let endpoint = reserved.endpoint.clone();
+    // Zenoh binds the port itself.
+    drop(reserved);
+    let port = ZenohPort::serve(agent, &endpoint).map_err(endpoint_error)?;
+    print_message(&LinkMessage::Listens(vec![endpoint]));
+    Ok(port)
 }
 
 /// Converts the error of a wire that could not be made.

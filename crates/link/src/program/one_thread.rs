@@ -3,7 +3,7 @@
 
 use crate::wire::zenoh::ONE_THREAD;
 use sidestep_session::Error;
-use sidestep_session::fleet::{Job, LINK_PROGRAM, Tls};
+use sidestep_session::fleet::{Job, LINK_PROGRAM, Tls, VehicleJob};
 use std::process::{Command, ExitCode};
 
 /// The word before a job that is given as an argument: a process that starts again has read its standard input.
@@ -21,7 +21,7 @@ pub(super) fn is_missing_for(job: &Job) -> bool {
 fn certificates(job: &Job) -> Option<&Tls> {
     match job {
         Job::Fleet(job) => job.common.tls.as_ref(),
-        Job::Node(job) => job.common.tls.as_ref(),
+        Job::Node(job) | Job::Vehicle(VehicleJob { node: job, .. }) => job.common.tls.as_ref(),
         Job::Watch(job) => job.tls.as_ref(),
     }
 }

@@ -449,6 +449,17 @@ pub(super) fn open_query_session(
     client_config(connect, guard, within).open().map_err(|reason| no_answer(connect, reason))
 }
 
+/// Returns the session by which a node serves its vehicle at an endpoint.
+///
+/// # Errors
+/// When the endpoint cannot be bound.
+pub(crate) fn open_vehicle_session(endpoint: &str) -> Result<Session, WireSetupError> {
+    check_vacant(endpoint)?;
+    let listen = [endpoint.to_string()];
+    let config = ZenohConfig { mode: "router", listen: &listen, ..ZenohConfig::default() };
+    config.open().map_err(|reason| endpoint_in_use(&listen, reason))
+}
+
 /// Returns the error of endpoints that do not answer. Zenoh says of most that time has passed, and not why.
 fn no_answer(connect: &[String], said: String) -> WireSetupError {
     let mut reasons = Vec::new();

@@ -18,3 +18,4 @@ mod soak;
 mod support;
 mod threads;
 mod tls;
+mod vehicles;

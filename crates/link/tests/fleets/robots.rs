@@ -20,8 +20,7 @@ fn office(cycles: u64, more: &str) -> String {
 }
 
 const ANNOUNCE: &str = "behaviour = { kind = \"announce\", turn_every = 20 }";
-const SHUTTLE: &str =
-    "behaviour = { kind = \"shuttle\", a = [1, 22, 3, 8], b = [28, 22, 3, 8], avoidance = \"plan\" }";
+const SHUTTLE: &str = "behaviour = { kind = \"shuttle\", a = [1, 22, 3, 8], b = [28, 22, 3, 8], avoidance = \"plan\" }";
 
 #[test]
 fn threads_come_out_as_one_process_does() {
@@ -117,7 +116,9 @@ fn robots_that_cannot_be_nodes_are_refused_with_the_way_to_make_them_some() {
             patience_s: 1.0,
         })
     };
-    for (number, cause) in [(9, "the scenario has no robot 9"), (7, "the scenario has no airplane 7")] {
+    for (number, cause) in
+        [(9, "the scenario has no robot 9"), (7, "the scenario has no airplane 7")]
+    {
         let said = refused(&node(number));
         assert!(said.contains(cause) && said.contains("give --robot 0 to 3"), "{said}");
     }

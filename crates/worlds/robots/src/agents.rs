@@ -6,6 +6,7 @@
 use super::decide::{
     ActionId, Contact, Decision, Memory, Percept, ReceivedMessage, TripEvent, nearest_by_sector,
 };
+use super::effector::STAY;
 use super::purpose;
 use super::sensor::{NOTHING, Reading};
 use super::world::{RobotBody, RobotModel, RobotsWorld, Role};
@@ -115,10 +116,12 @@ impl RobotAgent {
         let mut memory = Memory { words: percept.memory };
         let mut draws = self.world.streams.draws(self.id, percept.cycle, purpose::DECIDE);
         let decision = model.behaviour.decide(&seen, &mut memory, &mut draws);
+        let is_known = usize::from(decision.action) < model.body.effector.actions.len();
         Ok(RobotControl {
             id: self.id,
             cycle: percept.cycle,
-            action: decision.action,
+            // A behavior of a user, or one with a memory that it has not written, may choose an action that there is not.
+            action: if is_known { decision.action } else { STAY },
             trip: decision.trip,
             broadcast: decision.broadcast,
             memory: memory.words,
@@ -150,7 +153,10 @@ impl RobotAgent {
         let kinds = self.world.kinds.len();
         if let Some(contact) = percept.contact.filter(|one| usize::from(one.kind) >= kinds) {
             let kind = contact.kind;
-            return Err(format!("it touched kind {kind}; the scenario has kinds 0 to {}", kinds - 1));
+            return Err(format!(
+                "it touched kind {kind}; the scenario has kinds 0 to {}",
+                kinds - 1
+            ));
         }
         let robots = self.world.robots.len();
         let is_known = |heard: &ReceivedMessage| (heard.sender as usize) < robots;

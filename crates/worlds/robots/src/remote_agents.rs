@@ -91,7 +91,9 @@ impl RobotsWorld {
             return Err("there is no such robot; give ids of robots".into());
         };
         if model.is_external {
-            return Err("it follows the orders of a caller; give it orders in place of controls".into());
+            return Err(
+                "it follows the orders of a caller; give it orders in place of controls".into()
+            );
         }
         let read = postcard::take_from_bytes::<RobotControl>(bytes).ok();
         let Some((control, _)) = read.filter(|(_, rest)| rest.is_empty()) else {
@@ -140,7 +142,8 @@ impl RobotsWorld {
     ) -> Result<RobotControl, String> {
         let control = self.read_control(now, id, bytes)?;
         if percepts.binary_search_by_key(&id, |percept| percept.id).is_err() {
-            let cause = "it does not decide in this cycle; give controls for those that have a percept";
+            let cause =
+                "it does not decide in this cycle; give controls for those that have a percept";
             return Err(cause.into());
         }
         Ok(control)

@@ -18,8 +18,8 @@ use sidestep_kernel::view::{
     BodyId, Frame, FrameOptions, GridTeam, Inspection, PositionTableColumns, Scenery,
 };
 use sidestep_kernel::{
-    CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld, Run,
-    RunConfig, RunInputs, RunStats, World, WorldMetrics, WorldView,
+    CheckpointableWorld, ControllableWorld, Cycle, Digest, EntityId, InputError, RecordableWorld,
+    Run, RunConfig, RunInputs, RunStats, World, WorldMetrics, WorldView,
 };
 use sidestep_scenario::{Source, metric_label};
 use std::sync::Arc;

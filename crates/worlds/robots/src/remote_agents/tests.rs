@@ -209,10 +209,9 @@ fn recorded_controls_are_replayed_to_the_same_digest() {
 
 #[test]
 fn controls_that_no_robot_can_carry_out_are_refused_as_a_whole_with_the_reason() {
-    let mut run = run(&MIXED.replace("[radio]\nrange_m = 2\nloss = 0.2\n", "").replace(
-        "{ kind = \"announce\", turn_every = 10 }",
-        "{ kind = \"wander\" }",
-    ));
+    let mut run = run(&MIXED
+        .replace("[radio]\nrange_m = 2\nloss = 0.2\n", "")
+        .replace("{ kind = \"announce\", turn_every = 10 }", "{ kind = \"wander\" }"));
     let right = RobotControl {
         id: 0,
         cycle: 0,
@@ -234,9 +233,17 @@ fn controls_that_no_robot_can_carry_out_are_refused_as_a_whole_with_the_reason()
         (0, long, "no control of this build"),
         (1, bytes(&right), "it is of robot 0 and cycle 0; give that of robot 1 and cycle 0"),
         (0, bytes(&RobotControl { cycle: 1, ..right.clone() }), "give that of robot 0 and cycle 0"),
-        (0, bytes(&RobotControl { action: 9, ..right.clone() }), "it tries action 9; give one of 0 to 3"),
+        (
+            0,
+            bytes(&RobotControl { action: 9, ..right.clone() }),
+            "it tries action 9; give one of 0 to 3",
+        ),
         (0, bytes(&RobotControl { broadcast: Some(1), ..right.clone() }), "add [radio]"),
-        (idle, bytes(&RobotControl { id: idle, ..right.clone() }), "it does not decide in this cycle"),
+        (
+            idle,
+            bytes(&RobotControl { id: idle, ..right.clone() }),
+            "it does not decide in this cycle",
+        ),
     ];
     for (id, bytes, reason) in wrong {
         let given = [(id, bytes)];
