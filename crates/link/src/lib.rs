@@ -17,6 +17,7 @@
 //! hosted_run.rs      the recorded run at the server
 //! server/            the server of the world
 //! node/              the node of an agent
+//! ros2/              a run as a node of ROS 2, without ROS
 //! program/           the process: its job, logs, metrics and child processes
 //! ```
 
@@ -35,6 +36,7 @@ pub mod program;
 pub mod protocol;
 mod recent_senders;
 mod replay_window;
+pub mod ros2;
 pub mod server;
 pub mod signature;
 pub mod wire;

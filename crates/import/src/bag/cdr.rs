@@ -188,7 +188,20 @@ macro_rules! number {
     )*};
 }
 
-number!(f32, f64, i32, u32);
+number!(f32, f64, i8, i32, u8, u32);
+
+impl Cdr for bool {
+    const MIN_BYTES: usize = 1;
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, CdrError> {
+        // Programs write 1; any other number but 0 means the same to them.
+        u8::read(reader).map(|byte| byte != 0)
+    }
+
+    fn write(&self, writer: &mut Writer) {
+        u8::from(*self).write(writer);
+    }
+}
 
 impl Cdr for String {
     const MIN_BYTES: usize = 4;
