@@ -18,6 +18,7 @@
 //! server/            the server of the world
 //! vehicle/           programs of users that decide in place of an agent's own, over a public wire
 //! node/              the node of an agent
+//! ros2/              a run as a node of ROS 2, without ROS
 //! program/           the process: its job, logs, metrics and child processes
 //! ```
 
@@ -37,6 +38,7 @@ pub mod protocol;
 mod recent_senders;
 mod replay_window;
 mod robots;
+pub mod ros2;
 pub mod server;
 pub mod signature;
 mod vehicle;

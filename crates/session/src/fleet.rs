@@ -1,4 +1,5 @@
-//! The language in which a command asks the program `sidestep-link` to fly a fleet, and in which that answers.
+//! The language in which a command asks the program `sidestep-link` to fly a fleet or to show a run to ROS 2, and in which
+//! that answers.
 //!
 //! One line of JSON goes in, a [`Job`]; lines of JSON come out, [`LinkMessage`]. The program ends in good order when its
 //! standard input ends: the process that started it is gone, or wants it to end. So no process is left over, however
@@ -47,6 +48,8 @@ pub enum Job {
     Vehicle(VehicleJob),
     /// Watch a fleet that flies already.
     Watch(WatchJob),
+    /// Run a scenario as a node of ROS 2.
+    Ros2(Ros2Job),
 }
 
 /// The name of an agent, in the form used by people: `airplane 3`, or `connector 0.3` for part 3 of body 0.
@@ -173,6 +176,54 @@ pub struct WatchJob {
     pub patience_s: f64,
 }
 
+/// A run in one process that others see as a node of ROS 2.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ros2Job {
+    /// Settings that servers and nodes of fleets have, too.
+    pub common: CommonSettings,
+    /// The domain, by which ROS 2 separates systems on one network.
+    pub domain: u32,
+    /// The namespace of the node and of its topics: `/`, or names with a slash before each.
+    pub namespace: String,
+    /// The distribution of ROS 2 of the others.
+    pub distribution: RosDistribution,
+    /// Endpoints at which the others connect; none if this node only connects.
+    pub listen: Vec<String>,
+    /// Endpoints of routers to which this node connects.
+    pub connect: Vec<String>,
+    /// Seconds of the scenario in a second: 1 is as fast as in the scenario.
+    pub speed: f64,
+    /// Whether the run waits for the service `resume` or `step` before its first cycle.
+    pub starts_paused: bool,
+    /// Number of threads that compute the run.
+    pub workers: usize,
+    /// Folder in which the run is recorded.
+    pub out: Option<PathBuf>,
+    /// Whether an earlier run there is replaced.
+    pub replace: bool,
+}
+
+/// Distributions of ROS 2 that differ in what they send.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RosDistribution {
+    /// Its types have no hashes.
+    Humble,
+    /// Jazzy, and all others since Iron: keys have the hashes of types.
+    Jazzy,
+}
+
+/// What a run shows to ROS 2.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RosGraph {
+    /// The full name of the node.
+    pub node: String,
+    /// The topics that it publishes, each with its type, by name.
+    pub topics: Vec<(String, String)>,
+    /// The services that it has, each with its type.
+    pub services: Vec<(String, String)>,
+}
+
 /// The course of time in a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -232,6 +283,8 @@ pub struct Tls {
 pub enum LinkMessage {
     /// It listens at these endpoints.
     Listens(Vec<String>),
+    /// The node of ROS 2 is there, with its first messages.
+    Ros2(RosGraph),
     /// The present state of the fleet.
     Fleet(FleetStatus),
     /// The scenery for watchers: everything that stays the same.

@@ -18,6 +18,7 @@
 //! inspect.rs       what any file is, and what becomes of it
 //! trajectory.rs    the motions of arms in a recorded run
 //! thumbnail.rs     a small picture of a run
+//! ros/             frames of a run as messages of ROS 2
 //! ```
 //!
 //! Nothing here knows a terminal, the options of a command, or a world: functions that need the
@@ -58,6 +59,7 @@ mod watcher;
 pub mod export;
 pub mod fleet;
 pub mod report;
+pub mod ros;
 pub mod sweep;
 
 pub use driver::{RunTiming, Sinks, drive};

@@ -113,7 +113,7 @@ pub(crate) struct FleetArgs {
     link: LinkArgs,
 }
 
-fn parse_speed(text: &str) -> Result<f64, String> {
+pub(super) fn parse_speed(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x| (0.01..=1000.0).contains(x));
     number.ok_or_else(|| "give a number from 0.01 to 1000".into())
 }
@@ -156,7 +156,10 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
             end = Some(FleetEnd { topology, summary, outcome, fleet });
         }
         // `run_job` returns the failure; scenes and views are for watchers.
-        LinkMessage::Failed(_) | LinkMessage::Scene(_) | LinkMessage::Seen(_) => {}
+        LinkMessage::Failed(_)
+        | LinkMessage::Scene(_)
+        | LinkMessage::Seen(_)
+        | LinkMessage::Ros2(_) => {}
     });
     table.clear();
     if let Some(end) = end {

@@ -21,6 +21,7 @@ mod replay;
 mod report;
 mod reproduce;
 mod resume;
+mod ros2;
 mod run;
 mod schema;
 mod studio;

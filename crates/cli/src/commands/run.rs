@@ -1,6 +1,7 @@
 //! `sidestep run`: scenario -> cycles -> report.
 
 use super::finish::run_to_end;
+use super::ros2::{Ros2Args, RunToShow, check_no_sweep, run_as_node};
 use super::sweep::{SweepRequest, run_sweep};
 use crate::console::{Console, LINE_COLS, wrap_text};
 use crate::exit::{ExitCode, Failure};
@@ -24,6 +25,7 @@ Examples:
   sidestep run office.toml --json | jq .metrics.contacts
   sidestep run office.toml --mcap office.mcap    for Foxglove and other viewers
   sidestep run office.toml --foxglove 127.0.0.1:8765    watch it there
+  sidestep run office.toml --ros2 --domain 7    a node of ROS 2, without ROS
   sidestep run tracks.csv              replay recorded traffic
   sidestep run problem.json            a problem of the League of Robot Runners
 
@@ -63,15 +65,19 @@ pub(crate) struct RunArgs {
     #[arg(long, requires = "written")]
     replace: bool,
 
-    // Last, because its heading is that of all options that follow.
+    // These are last, because their headings are those of all options that follow.
     #[command(flatten)]
     many: ReplicationArgs,
+
+    #[command(flatten)]
+    ros2: Ros2Args,
 }
 
 /// # Errors
 /// When the scenario or the folder is wrong, or results cannot be stored.
 pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure> {
     if args.many.is_requested() {
+        check_no_sweep(&args.ros2)?;
         if args.foxglove.is_some() {
             let remedy = "leave it out, or run one of them alone";
             return Err(InputError::new("--foxglove", "a sweep has no single view", remedy).into());
@@ -99,6 +105,15 @@ pub(crate) fn run(args: &RunArgs, console: Console) -> Result<ExitCode, Failure>
     let options = ImportOptions::from_overrides(&args.scenario.all_overrides());
     let import = worlds().import_scenario(&args.scenario.file, &options)?;
     let workers = args.workers.count();
+    if args.ros2.is_requested() {
+        let run = RunToShow {
+            scenario: &args.scenario,
+            workers,
+            out: args.out.clone(),
+            replace: args.replace,
+        };
+        return run_as_node(&args.ros2, &run, console);
+    }
     let paths = OutputPaths {
         folder: args.out.as_deref(),
         mcap: args.mcap.as_deref().map(|file| (file, args.mcap_every)),

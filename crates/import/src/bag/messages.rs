@@ -26,6 +26,10 @@ named! {
     TfMessage "tf2_msgs/msg/TFMessage" "definitions/TFMessage.msg"
     JointState "sensor_msgs/msg/JointState" "definitions/JointState.msg"
     JointTrajectory "trajectory_msgs/msg/JointTrajectory" "definitions/JointTrajectory.msg"
+    Clock "rosgraph_msgs/msg/Clock" "definitions/Clock.msg"
+    Bool "std_msgs/msg/Bool" "definitions/Bool.msg"
+    OccupancyGrid "nav_msgs/msg/OccupancyGrid" "definitions/OccupancyGrid.msg"
+    MarkerArray "visualization_msgs/msg/MarkerArray" "definitions/MarkerArray.msg"
 }
 
 message!(
@@ -220,6 +224,148 @@ message!(
         joint_names: Vec<String>,
         /// The points, by rising time.
         points: Vec<JointTrajectoryPoint>,
+    }
+);
+
+message!(
+    /// `rosgraph_msgs/msg/Clock`: the time of a simulation.
+    Clock {
+        /// The time since its start.
+        clock: Time,
+    }
+);
+
+message!(
+    /// `std_msgs/msg/Bool`: a truth value.
+    Bool {
+        /// The value.
+        data: bool,
+    }
+);
+
+message!(
+    /// `nav_msgs/msg/MapMetaData`: the size and the place of a map.
+    MapMetaData {
+        /// The time at which the map was loaded.
+        map_load_time: Time,
+        /// The side of a cell.
+        resolution_m: f32,
+        /// Cells along the first axis.
+        width: u32,
+        /// Cells along the second axis.
+        height: u32,
+        /// The pose of the corner of the first cell.
+        origin: Pose,
+    }
+);
+
+message!(
+    /// `nav_msgs/msg/OccupancyGrid`: a map of cells.
+    OccupancyGrid {
+        /// The time, and the frame of the map.
+        header: Header,
+        /// Its size and place.
+        info: MapMetaData,
+        /// The probability in percent that a cell is occupied, -1 where it is unknown; row by row from the first.
+        data: Vec<i8>,
+    }
+);
+
+message!(
+    /// `std_msgs/msg/ColorRGBA`: a color with its opacity, each from 0 to 1.
+    ColorRgba {
+        /// Red.
+        red: f32,
+        /// Green.
+        green: f32,
+        /// Blue.
+        blue: f32,
+        /// Opacity.
+        opacity: f32,
+    }
+);
+
+message!(
+    /// `sensor_msgs/msg/CompressedImage`: an image in the bytes of a file.
+    CompressedImage {
+        /// The time and the frame of the camera.
+        header: Header,
+        /// The format of the file.
+        format: String,
+        /// The bytes of the file.
+        data: Vec<u8>,
+    }
+);
+
+message!(
+    /// `visualization_msgs/msg/MeshFile`: a file with a mesh.
+    MeshFile {
+        /// Its name, by which its format is known.
+        filename: String,
+        /// Its bytes.
+        data: Vec<u8>,
+    }
+);
+
+message!(
+    /// `visualization_msgs/msg/Marker`: a shape that a viewer shows.
+    Marker {
+        /// The time, and the frame of the pose.
+        header: Header,
+        /// The namespace in which the number is unique.
+        namespace: String,
+        /// The number of the marker.
+        id: i32,
+        /// The kind of shape, e.g. 1 for a cuboid.
+        shape: i32,
+        /// 0 to show the marker, 2 to remove it.
+        action: i32,
+        /// The pose of the shape's center.
+        pose: Pose,
+        /// The extent of the shape along its axes in m; the first of a line is its width.
+        scale: [f64; 3],
+        /// The color.
+        color: ColorRgba,
+        /// The time for which the marker is shown; 0 for always.
+        lifetime: Time,
+        /// Whether the marker follows its frame between two messages.
+        is_frame_locked: bool,
+        /// The points of a line in m, relative to the pose.
+        points: Vec<[f64; 3]>,
+        /// The color of each point, or nothing.
+        colors: Vec<ColorRgba>,
+        /// The place of a texture, or nothing.
+        texture_resource: String,
+        /// The texture itself.
+        texture: CompressedImage,
+        /// The coordinates of the points on the texture.
+        uv_coordinates: Vec<[f32; 2]>,
+        /// The text of a marker that is one.
+        text: String,
+        /// The place of a mesh, or nothing.
+        mesh_resource: String,
+        /// The mesh itself.
+        mesh_file: MeshFile,
+        /// Whether the mesh has its own materials.
+        mesh_use_embedded_materials: bool,
+    }
+);
+
+message!(
+    /// `visualization_msgs/msg/MarkerArray`: shapes that a viewer shows.
+    MarkerArray {
+        /// The shapes.
+        markers: Vec<Marker>,
+    }
+);
+
+message!(
+    /// `std_srvs/srv/Trigger_Response`: how an order without parameters went.
+    TriggerResponse {
+        /// Whether it was carried out.
+        success: bool,
+        /// The outcome in words.
+        message: String,
     }
 );
 

@@ -111,10 +111,24 @@ pub struct Frame {
     /// worlds without odometry.
     #[serde(default)]
     pub odometry: Vec<(BodyId, Pose)>,
+    /// The values of joints by their encoders, which are enabled with odometry; none in worlds without arms.
+    #[serde(default)]
+    pub joints: Vec<JointValues>,
     /// The events since the previous frame, by time.
     pub log: Vec<LogEvent>,
     /// Number of events that were dropped because there were too many.
     pub log_left_out: u64,
+}
+
+/// The values of the joints of one arm at one moment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointValues {
+    /// The number of the body that the arm is.
+    pub number: u32,
+    /// The names of its joints, from base to tip.
+    pub names: Vec<String>,
+    /// Their values in the same order, rad or m.
+    pub values: Vec<f64>,
 }
 
 /// The parts of a frame that are made on request, because they take time.

@@ -222,7 +222,7 @@ fn finish(
 
 /// The watcher of the run, which only logs: the run advances by one cycle at a time, and the [`FleetSupervisor`] decides
 /// when to stop.
-struct WarningLogger;
+pub(super) struct WarningLogger;
 
 impl Watcher for WarningLogger {
     fn warn(&self, error: &Error) {

@@ -4,6 +4,7 @@
 //! fleet.rs           the server of a world, with the nodes that it starts (children.rs)
 //! node.rs            one node
 //! watch.rs           a viewer of a fleet; view.rs: the views at the server
+//! ros2.rs            a run as a node of ROS 2
 //! scenario.rs        the scenario that server and nodes read
 //! certificates.rs    checks of certificates; denials.rs: what they do not allow, for the log
 //! one_thread.rs      the one thread of the network that encrypted links need
@@ -24,6 +25,7 @@ mod one_thread;
 mod output;
 mod packet_table;
 mod parent_monitor;
+mod ros2;
 mod scenario;
 mod view;
 mod watch;
@@ -40,8 +42,8 @@ use std::process::ExitCode;
 
 /// Usage, for a user who starts the program by hand.
 const USAGE: &str = "\
-sidestep-link runs the server and the nodes of a fleet. `sidestep fleet` and `sidestep node` start it
-and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
+sidestep-link runs the server and the nodes of a fleet, and shows runs to ROS 2. `sidestep fleet`, `sidestep node` and
+`sidestep run --ros2` start it and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
 
 /// Does the job that standard input asks for. Exit codes are those of `sidestep`.
 pub fn main() -> ExitCode {
@@ -115,6 +117,10 @@ fn run_job(job: Job) -> Result<(), Error> {
                 VIEWER_NAME,
             )?;
             watch::watch_fleet(&job, &ParentMonitor::watch())
+        }
+        Job::Ros2(job) => {
+            apply_common_settings(&job.common, job.connect.iter().chain(&job.listen))?;
+            ros2::run(&job, &ParentMonitor::watch())
         }
     }
 }

@@ -88,6 +88,8 @@ struct ZenohConfig<'a> {
     connect: &'a [String],
     /// Time that it waits for the first connection; none for a session that keeps trying.
     connected_within: Option<Duration>,
+    /// Whether it tells those who connect of each other.
+    has_gossip: bool,
     /// Certificates, and the endpoint at which they control access.
     guard: Option<(&'a Credentials, Guarded)>,
 }
@@ -100,7 +102,7 @@ impl ZenohConfig<'_> {
         let mut keys = vec![
             ("mode", format!("{:?}", self.mode)),
             ("scouting/multicast/enabled", "false".into()),
-            ("scouting/gossip/enabled", "false".into()),
+            ("scouting/gossip/enabled", self.has_gossip.to_string()),
             // A router would sleep that long before it opens, to find others by scouting.
             ("scouting/delay", "0".into()),
             // A router would stamp relayed frames with the time of its wall clock, which no code reads.
@@ -400,6 +402,7 @@ impl ZenohWire {
             connect: &self.connect,
             guard: self.credentials.as_ref().zip(guarded),
             connected_within: None,
+            has_gossip: false,
         };
         let link = config
             .open()
@@ -458,6 +461,33 @@ pub(crate) fn open_vehicle_session(endpoint: &str) -> Result<Session, WireSetupE
     let listen = [endpoint.to_string()];
     let config = ZenohConfig { mode: "router", listen: &listen, ..ZenohConfig::default() };
     config.open().map_err(|reason| endpoint_in_use(&listen, reason))
+}
+
+/// Returns the session of a node of ROS 2. One that listens is a *router*, by which other nodes find each other, as ROS
+/// requires one on each machine; one that only connects is a *client* of another router.
+///
+/// # Errors
+/// When an endpoint cannot be bound, or none of the routers answers within some time.
+pub(crate) fn open_ros2_session(
+    listen: &[String],
+    connect: &[String],
+    within: Duration,
+) -> Result<Session, WireSetupError> {
+    for endpoint in connect {
+        host_and_port(endpoint)?;
+    }
+    if listen.is_empty() {
+        return client_config(connect, None, within).open().map_err(|said| {
+            let problems = connect.iter().filter_map(|endpoint| connection_problem(endpoint));
+            let reason = problems.reduce(|all, next| format!("{all}; {next}")).unwrap_or(said);
+            WireSetupError::NoAnswer { endpoint: connect.join(", "), reason }
+        });
+    }
+    listen.iter().try_for_each(|endpoint| check_vacant(endpoint))?;
+    let has_gossip = true;
+    let config =
+        ZenohConfig { mode: "router", listen, connect, has_gossip, ..ZenohConfig::default() };
+    config.open().map_err(|reason| endpoint_in_use(listen, reason))
 }
 
 /// Returns the error of endpoints that do not answer. Zenoh says of most that time has passed, and not why.

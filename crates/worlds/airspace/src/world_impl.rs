@@ -264,6 +264,7 @@ impl WorldView for AirspaceWorld {
             bodies: view::visible_bodies(self, state, now),
             scans: Vec::new(),
             odometry: Vec::new(),
+            joints: Vec::new(),
             log: events.iter().map(view::to_log_event).collect(),
             log_left_out,
         }

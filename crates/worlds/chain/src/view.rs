@@ -10,8 +10,8 @@ use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use crate::kinds;
 use sidestep_kernel::math::wrap_angle;
 use sidestep_kernel::view::{
-    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, Isometry2, LogEvent, Pose,
-    PositionTableColumns, Quantity, Scan, ScanSelection, Scenery, Severity, Shape, Vec3,
+    Body, BodyCondition, BodyId, BodyKind, CoordinateColumn, Isometry2, JointValues, LogEvent,
+    Pose, PositionTableColumns, Quantity, Scan, ScanSelection, Scenery, Severity, Shape, Vec3,
 };
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 use sidestep_rods::geometry::{ConvexCore, Cuboid, convert_dimensions, cross};
@@ -105,6 +105,25 @@ impl<const D: usize> ChainWorld<D> {
             }
         }
         poses
+    }
+
+    /// Returns the values of the joints of all arms, if they are asked for.
+    pub(crate) fn joint_values(
+        &self,
+        state: &ChainWorldState<D>,
+        is_enabled: bool,
+    ) -> Vec<JointValues> {
+        let mut arms = Vec::new();
+        if !is_enabled {
+            return arms;
+        }
+        for (number, spec) in (0..).zip(self.chains.iter()) {
+            let Some(arm) = &spec.arm else { continue };
+            let Some(values) = state.body(number as usize).joints.clone() else { continue };
+            let names = arm.serial.variables.iter().map(|variable| variable.name.clone());
+            arms.push(JointValues { number, names: names.collect(), values });
+        }
+        arms
     }
 
     /// Returns the laser scans that leaders on wheels are about to take.

@@ -235,6 +235,7 @@ impl<const D: usize> WorldView for ChainWorld<D> {
             bodies: self.view_bodies(state, now),
             scans: self.scans(state, now, &look.scans),
             odometry: self.odometry_poses(state, collector.has_odometry),
+            joints: self.joint_values(state, collector.has_odometry),
             log: events.iter().map(view_event).collect(),
             log_left_out,
         }

@@ -170,6 +170,10 @@ impl Collector {
     /// Continues from cycle `now`, after its state was restored.
     pub(super) fn resume(&mut self, world: &RobotsWorld, state: &mut RobotsState, now: Cycle) {
         self.recorded = now;
+        // Wheels count from here on: what they counted belongs to another past.
+        if self.odometry.take().is_some() {
+            self.watch_odometry(world);
+        }
         if self.is_recording {
             self.start(world, state, now);
         }

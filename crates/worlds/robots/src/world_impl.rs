@@ -215,6 +215,7 @@ impl WorldView for RobotsWorld {
             bodies: self.visible_bodies(state),
             scans: self.scans(state, now, &options.scans),
             odometry: self.odometry_poses(collector.odometry()),
+            joints: Vec::new(),
             log: events.iter().map(|event| self.view_event(state, event)).collect(),
             log_left_out,
         }

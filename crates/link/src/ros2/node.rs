@@ -1,0 +1,363 @@
+//! The node on the network: its topics and services.
+
+use super::rmw::{
+    Attachment, EndpointKind, Gid, QualityOfService, RosEndpoint, RosNodeName, RosType,
+    gid_of_token,
+};
+use super::types::{TRIGGER, message_type};
+use crate::wire::endpoint::{WireSetupError, without_sources};
+use crate::wire::zenoh::open_ros2_session;
+use sidestep::import::bag::cdr::encode;
+use sidestep::import::bag::messages::TriggerResponse;
+use sidestep_session::fleet::{Ros2Job, RosGraph};
+use sidestep_session::ros::RosMessage;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use zenoh::key_expr::KeyExpr;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait};
+
+/// The name of the node of a run.
+const NODE_NAME: &str = "sidestep";
+
+/// Number of messages that are kept for a slow receiver of frames (as `tf2` has it).
+const TF_DEPTH: u32 = 100;
+
+/// What a service does with the run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunService {
+    /// Stops time.
+    Pause,
+    /// Lets time pass.
+    Resume,
+    /// Computes one cycle while time stands still.
+    Step,
+    /// Takes the run back to its start.
+    Reset,
+}
+
+impl RunService {
+    /// All services.
+    pub const ALL: [Self; 4] = [Self::Pause, Self::Resume, Self::Step, Self::Reset];
+
+    /// Returns its name, which is one of the node's own: `~/pause`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pause => "pause",
+            Self::Resume => "resume",
+            Self::Step => "step",
+            Self::Reset => "reset",
+        }
+    }
+}
+
+/// A request to a service, which waits for its answer.
+pub struct ServiceRequest {
+    /// The service.
+    pub service: RunService,
+    query: Query,
+    attachment: Attachment,
+}
+
+impl fmt::Debug for ServiceRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ServiceRequest").field("service", &self.service).finish_non_exhaustive()
+    }
+}
+
+impl ServiceRequest {
+    /// Answers whether the service has done it, with words for people.
+    pub fn answer(self, success: bool, message: impl Into<String>) {
+        let response = TriggerResponse { success, message: message.into() };
+        // The client knows its response by the number and the identity of its request.
+        let attachment = Attachment { source_time_ns: wall_clock_ns(), ..self.attachment };
+        let key = self.query.key_expr().clone();
+        let reply = self.query.reply(key, encode(&response)).attachment(attachment.to_bytes());
+        // An error means that the client is gone.
+        let _ = reply.wait();
+    }
+}
+
+/// A message and its attachment as they were sent.
+type SentMessage = (Vec<u8>, Vec<u8>);
+
+/// What late ones get of a latched topic.
+struct History {
+    last: Arc<Mutex<Option<SentMessage>>>,
+    _queryable: Queryable<()>,
+    /// By it those who are there already notice a new topic with a history.
+    _token: LivelinessToken,
+}
+
+fn lock(last: &Mutex<Option<SentMessage>>) -> MutexGuard<'_, Option<SentMessage>> {
+    last.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The publisher of a topic.
+struct Publisher {
+    key: KeyExpr<'static>,
+    type_name: &'static str,
+    gid: Gid,
+    /// Number of messages sent.
+    sent: i64,
+    history: Option<History>,
+    _token: LivelinessToken,
+}
+
+/// The server of a service.
+struct Server {
+    name: String,
+    _queryable: Queryable<()>,
+    _token: LivelinessToken,
+}
+
+/// A node of ROS 2.
+pub struct RosNode {
+    name: RosNodeName,
+    publishers: BTreeMap<String, Publisher>,
+    servers: Vec<Server>,
+    /// Number of topics and services that have had a token.
+    endpoints: u32,
+    requests: Receiver<ServiceRequest>,
+    /// Number of requests that were no requests.
+    malformed: Arc<AtomicU64>,
+    _token: LivelinessToken,
+    session: Session,
+}
+
+impl fmt::Debug for RosNode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RosNode").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+/// The time that the first connection to a router may take.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
+impl RosNode {
+    /// Joins the network as a job says, with its services and no topics yet.
+    ///
+    /// # Errors
+    /// When an endpoint cannot be bound, or no router answers.
+    pub fn join(job: &Ros2Job) -> Result<Self, WireSetupError> {
+        let session = open_ros2_session(&job.listen, &job.connect, CONNECT_TIMEOUT)?;
+        let name = RosNodeName {
+            domain: job.domain,
+            namespace: job.namespace.clone(),
+            name: NODE_NAME.into(),
+            distribution: job.distribution,
+            session: session.zid().to_string(),
+        };
+        let token = declare_token(&session, name.node_token())?;
+        // The sender is kept by the services alone.
+        let (request_sender, requests) = channel();
+        let mut node = Self {
+            name,
+            publishers: BTreeMap::new(),
+            servers: Vec::new(),
+            endpoints: 0,
+            requests,
+            malformed: Arc::default(),
+            _token: token,
+            session,
+        };
+        for service in RunService::ALL {
+            let server = node.serve(service, request_sender.clone())?;
+            node.servers.push(server);
+        }
+        Ok(node)
+    }
+
+    /// Returns what the node shows by now.
+    pub fn graph(&self) -> RosGraph {
+        let topics = self.publishers.iter();
+        let services = self.servers.iter();
+        RosGraph {
+            node: self.name.full_name(),
+            topics: topics.map(|(name, topic)| (name.clone(), topic.type_name.into())).collect(),
+            services: services.map(|server| (server.name.clone(), TRIGGER.name.into())).collect(),
+        }
+    }
+
+    /// Sends a message. The first one of a topic makes the topic known.
+    ///
+    /// # Errors
+    /// When the session is closed, or the type is not one of [`super::types`].
+    pub fn publish(&mut self, message: &RosMessage) -> Result<(), WireSetupError> {
+        let topic = self.topic_name(&message.topic);
+        if !self.publishers.contains_key(&topic) {
+            let publisher = self.declare_publisher(&topic, message)?;
+            self.publishers.insert(topic.clone(), publisher);
+        }
+        let Some(publisher) = self.publishers.get_mut(&topic) else { return Ok(()) };
+        publisher.sent += 1;
+        let attachment = Attachment {
+            sequence_number: publisher.sent,
+            source_time_ns: wall_clock_ns(),
+            gid: publisher.gid,
+        };
+        let attachment = attachment.to_bytes();
+        if let Some(history) = &publisher.history {
+            *lock(&history.last) = Some((message.bytes.clone(), attachment.to_vec()));
+        }
+        let put = self.session.put(&publisher.key, message.bytes.clone()).attachment(attachment);
+        put.wait().map_err(|error| closed_session(&*error))
+    }
+
+    /// Returns the next request to a service; waits for one at most the given time.
+    pub fn next_request(&self, within: Duration) -> Option<ServiceRequest> {
+        match self.requests.recv_timeout(within) {
+            Ok(request) => Some(request),
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
+        }
+    }
+
+    /// Returns the number of requests so far that were none: without a proper attachment or in another encoding.
+    pub fn malformed_requests(&self) -> u64 {
+        self.malformed.load(Ordering::Relaxed)
+    }
+
+    /// Leaves the network: the others see that the node and all that it had is gone.
+    pub fn leave(self) {
+        let Self { publishers, servers, session, .. } = self;
+        drop(publishers);
+        drop(servers);
+        // An error means that it is closed already.
+        let _ = session.close().wait();
+    }
+
+    /// Returns the full name of a topic. Clock and frames are one for a whole domain: programs of ROS look for them nowhere
+    /// else.
+    fn topic_name(&self, topic: &str) -> String {
+        use sidestep_session::ros::{CLOCK_TOPIC, STATIC_TF_TOPIC, TF_TOPIC};
+        match topic {
+            CLOCK_TOPIC | TF_TOPIC | STATIC_TF_TOPIC => topic.into(),
+            _ => self.name.resolve(topic.trim_start_matches('/')),
+        }
+    }
+
+    fn next_token(&mut self, endpoint: &RosEndpoint) -> String {
+        self.endpoints += 1;
+        self.name.endpoint_token(endpoint, self.endpoints)
+    }
+
+    fn declare_publisher(
+        &mut self,
+        topic: &str,
+        message: &RosMessage,
+    ) -> Result<Publisher, WireSetupError> {
+        let ros_type = known_type(message.type_name)?;
+        let quality = match () {
+            () if message.is_latched => QualityOfService::LATCHED,
+            () if topic == sidestep_session::ros::TF_TOPIC => {
+                QualityOfService { depth: TF_DEPTH, ..QualityOfService::DEFAULT }
+            }
+            () => QualityOfService::DEFAULT,
+        };
+        let kind = EndpointKind::Publisher;
+        let endpoint = RosEndpoint { kind, name: topic.into(), ros_type, quality };
+        let token = self.next_token(&endpoint);
+        let key = KeyExpr::try_from(self.name.data_key(&endpoint)).map_err(|e| bad_key(&*e))?;
+        let history = match message.is_latched {
+            true => Some(self.declare_history(&endpoint, key.clone())?),
+            false => None,
+        };
+        Ok(Publisher {
+            key,
+            type_name: message.type_name,
+            gid: gid_of_token(&token),
+            sent: 0,
+            history,
+            // Last: whoever sees the token may ask at once.
+            _token: declare_token(&self.session, token)?,
+        })
+    }
+
+    fn declare_history(
+        &self,
+        endpoint: &RosEndpoint,
+        key: KeyExpr<'static>,
+    ) -> Result<History, WireSetupError> {
+        let at = self.name.history_key(endpoint);
+        let last: Arc<Mutex<Option<SentMessage>>> = Arc::default();
+        let answers = last.clone();
+        let queryable = self.session.declare_queryable(at.clone()).callback(move |query| {
+            let sent = lock(&answers).clone();
+            if let Some((bytes, attachment)) = sent {
+                // An error means that the other one is gone, or allows no replies with the key of the topic.
+                let _ = query.reply(key.clone(), bytes).attachment(attachment).wait();
+            }
+        });
+        let queryable = queryable.wait().map_err(|error| closed_session(&*error))?;
+        let token = declare_token(&self.session, at)?;
+        Ok(History { last, _queryable: queryable, _token: token })
+    }
+
+    fn serve(
+        &mut self,
+        service: RunService,
+        requests: Sender<ServiceRequest>,
+    ) -> Result<Server, WireSetupError> {
+        let name = self.name.resolve_private(service.name());
+        let endpoint = RosEndpoint {
+            kind: EndpointKind::Service,
+            name: name.clone(),
+            ros_type: TRIGGER,
+            quality: QualityOfService::DEFAULT,
+        };
+        let malformed = self.malformed.clone();
+        let key = self.name.data_key(&endpoint);
+        // Complete: clients ask only servers that can answer everything on their key.
+        let queryable = self.session.declare_queryable(key).complete(true).callback(move |query| {
+            let attachment = query.attachment().map(|bytes| bytes.to_bytes());
+            let attachment = attachment.and_then(|bytes| Attachment::from_bytes(&bytes));
+            let is_cdr = query.payload().is_none_or(|bytes| is_plain_cdr(&bytes.to_bytes()));
+            let (Some(attachment), true) = (attachment, is_cdr) else {
+                malformed.fetch_add(1, Ordering::Relaxed);
+                return;
+            };
+            // An error means that the node has ended.
+            let _ = requests.send(ServiceRequest { service, query, attachment });
+        });
+        let queryable = queryable.wait().map_err(|error| closed_session(&*error))?;
+        let token = self.next_token(&endpoint);
+        let token = declare_token(&self.session, token)?;
+        Ok(Server { name, _queryable: queryable, _token: token })
+    }
+}
+
+/// Returns whether bytes begin as plain CDR does, in either byte order. The request itself has no content: ROS puts one
+/// byte into it, because its languages have no empty structures.
+fn is_plain_cdr(bytes: &[u8]) -> bool {
+    matches!(bytes, [0, 0 | 1, ..]) && bytes.len() >= 4
+}
+
+fn known_type(name: &str) -> Result<RosType, WireSetupError> {
+    message_type(name).ok_or_else(|| closed_session(&format!("the type {name} has no hash here")))
+}
+
+fn declare_token(session: &Session, key: String) -> Result<LivelinessToken, WireSetupError> {
+    let declared = session.liveliness().declare_token(key).wait();
+    declared.map_err(|error| closed_session(&*error))
+}
+
+fn bad_key(error: &dyn fmt::Display) -> WireSetupError {
+    closed_session(&format!("a name is no key of Zenoh: {error}"))
+}
+
+fn closed_session(error: &dyn fmt::Display) -> WireSetupError {
+    let reason = without_sources(&error.to_string());
+    WireSetupError::NoAnswer { endpoint: "the network of ROS 2".into(), reason }
+}
+
+/// Returns the time of this machine, nanoseconds since 1970: by it others know how old a message is. No result depends
+/// on it.
+fn wall_clock_ns() -> i64 {
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+    since_1970.map_or(0, |since| i64::try_from(since.as_nanos()).unwrap_or(i64::MAX))
+}
