@@ -39,6 +39,6 @@ mod replay_window;
 mod robots;
 pub mod server;
 pub mod signature;
-mod vehicle;
+pub mod vehicle;
 pub mod wire;
 pub mod worlds;
