@@ -41,6 +41,6 @@ mod robots;
 pub mod ros2;
 pub mod server;
 pub mod signature;
-mod vehicle;
+pub mod vehicle;
 pub mod wire;
 pub mod worlds;

@@ -13,7 +13,8 @@ mod messages;
 mod port;
 mod robot;
 
-pub(crate) use port::{VehiclePort, ZenohPort};
+pub use port::VehiclePort;
+pub(crate) use port::ZenohPort;
 pub(crate) use robot::RobotVehicle;
 
 /// The version of keys and messages. A change that a vehicle would notice makes another one.

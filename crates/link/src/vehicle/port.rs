@@ -17,7 +17,7 @@ const MAX_WAITING: usize = 64;
 const MAX_CONTROL_BYTES: usize = 1_000;
 
 /// The link of a node with its vehicle. Both sides may be gone at any time: what is put into it may be lost.
-pub(crate) trait VehiclePort: Send {
+pub trait VehiclePort: Send {
     /// Sets the description that a vehicle is told when it asks.
     fn set_description(&mut self, bytes: Vec<u8>);
 
