@@ -18,7 +18,7 @@ use sidestep_session::fleet::{Ros2Job, RosDistribution};
 const ROBOT: &str = "format = 1\nworld = \"robots\"\nseed = 3\ncycles = 1000000\nregime = \"both\"\n\
     [map]\nbox_size_m = 0.25\nascii = \"\"\"\n\
     ################\n#......#.......#\n#......#.......#\n#..............#\n################\n\"\"\"\n\
-    [[robots]]\nat = [[2, 1, 90]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n";
+    [[robots]]\nat = [[2, 1, 1]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n";
 
 /// A chain of three connectors in the plane.
 const CHAIN: &str = "format = 1\nworld = \"chain\"\nseed = 3\ncycles = 1000\n[chain]\ndt_s = 0.05\n\
