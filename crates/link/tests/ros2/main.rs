@@ -221,7 +221,7 @@ fn a_run_with_a_folder_is_not_reset_and_its_folder_replays() {
         ..job
     });
     let peer = Peer::new(&node, 0, "/");
-    let refused = peer.ask("reset_then_steps");
+    let refused = peer.ask("reset_between_steps");
     let reset = &refused["reset"];
     assert_eq!(reset["success"], false);
     assert!(reset["message"].as_str().is_some_and(|words| words.contains("one past")), "{reset}");
