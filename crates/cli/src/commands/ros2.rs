@@ -206,7 +206,8 @@ fn print_graph(args: &Ros2Args, graph: &RosGraph, console: Console) {
 fn print_results(summary: &Value, outcome: KeyValues, console: Console) -> Result<(), Failure> {
     let digest = summary["digest"].as_str().unwrap_or_default();
     console.print_result_or_short(summary, &format!("{digest}\n"), || {
-        let name = summary["name"].as_str().unwrap_or_default();
+        let given = summary["name"].as_str().filter(|name| !name.is_empty());
+        let name = given.or(summary["world"].as_str()).unwrap_or_default();
         let cycles = group_thousands(summary["cycles"].as_u64().unwrap_or(0));
         let mut lines = vec![key_value_pair("cycles", cycles)];
         lines.extend(outcome);

@@ -18,7 +18,7 @@ use sidestep_session::fleet::{Ros2Job, RosDistribution};
 const ROBOT: &str = "format = 1\nworld = \"robots\"\nseed = 3\ncycles = 1000000\nregime = \"both\"\n\
     [map]\nbox_size_m = 0.25\nascii = \"\"\"\n\
     ################\n#......#.......#\n#......#.......#\n#..............#\n################\n\"\"\"\n\
-    [[robots]]\nat = [[2, 1, 90]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n";
+    [[robots]]\nat = [[2, 1, 1]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n";
 
 /// A chain of three connectors in the plane.
 const CHAIN: &str = "format = 1\nworld = \"chain\"\nseed = 3\ncycles = 1000\n[chain]\ndt_s = 0.05\n\
@@ -221,7 +221,7 @@ fn a_run_with_a_folder_is_not_reset_and_its_folder_replays() {
         ..job
     });
     let peer = Peer::new(&node, 0, "/");
-    let refused = peer.ask("reset_then_steps");
+    let refused = peer.ask("reset_between_steps");
     let reset = &refused["reset"];
     assert_eq!(reset["success"], false);
     assert!(reset["message"].as_str().is_some_and(|words| words.contains("one past")), "{reset}");
