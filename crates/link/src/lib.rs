@@ -17,6 +17,7 @@
 //! hosted_run.rs      the recorded run at the server
 //! server/            the server of the world
 //! node/              the node of an agent
+//! vda5050/           vehicles of a warehouse that carry out a plan (its broker.rs opens a socket, too)
 //! program/           the process: its job, logs, metrics and child processes
 //! ```
 
@@ -37,5 +38,6 @@ mod recent_senders;
 mod replay_window;
 pub mod server;
 pub mod signature;
+pub mod vda5050;
 pub mod wire;
 pub mod worlds;

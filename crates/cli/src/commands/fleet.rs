@@ -153,8 +153,11 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
         LinkMessage::Ended { summary, outcome, fleet } => {
             end = Some(FleetEnd { topology, summary, outcome, fleet });
         }
-        // `run_job` returns the failure; scenes and views are for watchers.
-        LinkMessage::Failed(_) | LinkMessage::Scene(_) | LinkMessage::Seen(_) => {}
+        // `run_job` returns the failure; scenes and views are for watchers, and vehicles of `sidestep dispatch`.
+        LinkMessage::Failed(_)
+        | LinkMessage::Scene(_)
+        | LinkMessage::Seen(_)
+        | LinkMessage::Dispatch(_) => {}
     });
     table.clear();
     if let Some(end) = end {

@@ -3,6 +3,7 @@
 //! ```text
 //! fleet.rs           the server of a world, with the nodes that it starts (children.rs)
 //! node.rs            one node
+//! dispatch.rs        the master control of vehicles (VDA 5050)
 //! watch.rs           a viewer of a fleet; view.rs: the views at the server
 //! scenario.rs        the scenario that server and nodes read
 //! certificates.rs    checks of certificates; denials.rs: what they do not allow, for the log
@@ -16,6 +17,7 @@
 mod certificates;
 mod children;
 mod denials;
+mod dispatch;
 mod fleet;
 mod log;
 mod metrics;
@@ -110,6 +112,11 @@ fn run_job(job: Job) -> Result<(), Error> {
                 VIEWER_NAME,
             )?;
             watch::watch_fleet(&job, &ParentMonitor::watch())
+        }
+        Job::Dispatch(job) => {
+            log::start(job.json_log, &job.log, false)?;
+            check_build(&job.planned.build)?;
+            dispatch::run(&job, &ParentMonitor::watch())
         }
     }
 }

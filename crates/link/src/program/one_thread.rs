@@ -23,6 +23,8 @@ fn certificates(job: &Job) -> Option<&Tls> {
         Job::Fleet(job) => job.common.tls.as_ref(),
         Job::Node(job) => job.common.tls.as_ref(),
         Job::Watch(job) => job.tls.as_ref(),
+        // Its link to the broker is none of Zenoh.
+        Job::Dispatch(_) => None,
     }
 }
 

@@ -187,7 +187,7 @@ impl Master {
         let was_complete = self.vehicles[vehicle].is_complete();
         let accepted = self.vehicles[vehicle].accept_state(&state, now);
         self.tell_errors(vehicle);
-        if had_order && self.vehicles[vehicle].order.is_none() {
+        if had_order && self.vehicles[vehicle].order.is_none() && !self.is_cancelled {
             let id = quote(&state.order_id);
             self.remark(vehicle, true, format!("has lost its order: it reports `{id}`"));
         }
@@ -302,7 +302,11 @@ impl Master {
         }
         let before: Vec<&str> =
             self.blockers(number).iter().map(|&other| &*self.vehicles[other].serial).collect();
-        if before.is_empty() { "waits for orders".into() } else { format!("waits for {}", before.join(", ")) }
+        if before.is_empty() {
+            "waits for orders".into()
+        } else {
+            format!("waits for {}", before.join(", "))
+        }
     }
 
     /// Sends what can be sent, and tells who is held and goes on.
@@ -383,7 +387,8 @@ impl Master {
     /// Returns the vehicles that still have to pass something before a node of a vehicle's route is released.
     fn open_predecessors(&self, number: usize, node: usize) -> impl Iterator<Item = usize> {
         let after = &self.vehicles[number].route.nodes[node].after;
-        let open = after.iter().filter(|before| self.vehicles[before.vehicle].progress < before.node);
+        let open =
+            after.iter().filter(|before| self.vehicles[before.vehicle].progress < before.node);
         open.map(|before| before.vehicle)
     }
 
@@ -434,7 +439,9 @@ impl Master {
 
     fn resend_cancellation(&mut self, number: usize, now: Duration) {
         let Some(cancellation) = &mut self.vehicles[number].cancellation else { return };
-        if cancellation.is_confirmed || now.saturating_sub(cancellation.sent_at) < self.config.resend {
+        if cancellation.is_confirmed
+            || now.saturating_sub(cancellation.sent_at) < self.config.resend
+        {
             return;
         }
         cancellation.sent_at = now;
@@ -452,7 +459,8 @@ impl Master {
         let header = self.header(number, self.next_headers[number].instant_actions);
         let next = &mut self.next_headers[number].instant_actions;
         *next = next.wrapping_add(1);
-        let message = OutgoingMessage::InstantActions(InstantActions { header, actions: vec![action] });
+        let message =
+            OutgoingMessage::InstantActions(InstantActions { header, actions: vec![action] });
         self.push_outgoing(number, "instantActions", message);
     }
 
@@ -504,7 +512,11 @@ impl Master {
             format!("{} ({:?}) {description}", quote(&error.error_type), error.error_level)
         });
         let words: Vec<String> = words.collect();
-        let text = if words.is_empty() { "reports no errors anymore".into() } else { format!("reports {}", words.join("; ")) };
+        let text = if words.is_empty() {
+            "reports no errors anymore".into()
+        } else {
+            format!("reports {}", words.join("; "))
+        };
         self.told_errors[number] = now;
         self.remark(number, !words.is_empty(), text);
     }
@@ -518,8 +530,8 @@ impl Master {
         let was_held = self.holds[number].is_some();
         self.holds[number].clone_from(&hold);
         match hold {
-            // All are held until they have reported for the first time: that is told by the silence that follows.
-            Some(_) if !was_held && self.vehicles[number].sums.orders == 0 => {}
+            // All are held until they have reported for the first time.
+            Some(_) if self.vehicles[number].is_awaited() => {}
             Some(reason) => {
                 let others = self.dependents(number);
                 let names: Vec<&str> =

@@ -76,7 +76,9 @@ impl FloorFrame {
 
 /// Why a plan has no routes: vehicles that move in a ring would have to start in the same instant.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("vehicles {vehicles:?} move in a ring, each to the place that another one leaves at the same instant")]
+#[error(
+    "vehicles {vehicles:?} move in a ring, each to the place that another one leaves at the same instant"
+)]
 pub struct RingError {
     /// The vehicles of the first ring.
     pub vehicles: Vec<u32>,
@@ -156,11 +158,8 @@ mod tests {
     #[test]
     fn a_place_that_two_pass_is_released_to_the_second_when_the_first_has_reached_the_next() {
         let corridor = FreeSpace::new(4, 1, |_, _| true);
-        let agent = |at: u32, goal: u32| Agent {
-            size: 1,
-            start: GridPose::new(at, 0, 0),
-            goal: (goal, 0),
-        };
+        let agent =
+            |at: u32, goal: u32| Agent { size: 1, start: GridPose::new(at, 0, 0), goal: (goal, 0) };
         let routes = routes_of(&corridor, vec![agent(0, 2), agent(1, 3)]).expect("no ring");
         let positions: Vec<_> = routes[0].nodes.iter().map(|node| node.position).collect();
         assert_eq!(positions, [(0, 0), (1, 0), (2, 0)]);

@@ -179,6 +179,8 @@ pub struct Vehicle {
     /// The last node of its route that was ever released to it.
     pub(super) released: usize,
     pub(super) order: Option<OrderInWork>,
+    /// The order before, which it was taken to have lost.
+    former_order: Option<OrderInWork>,
     /// The node at which its next order begins, once it is known to be able to begin one.
     next_first: Option<usize>,
     pub(super) cancellation: Option<Cancellation>,
@@ -189,7 +191,13 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
-    pub(super) fn new(serial: String, manufacturer: String, map_id: String, floor: FloorFrame, route: Route) -> Self {
+    pub(super) fn new(
+        serial: String,
+        manufacturer: String,
+        map_id: String,
+        floor: FloorFrame,
+        route: Route,
+    ) -> Self {
         Self {
             serial,
             manufacturer,
@@ -208,6 +216,7 @@ impl Vehicle {
             progress: 0,
             released: 0,
             order: None,
+            former_order: None,
             next_first: None,
             cancellation: None,
             begun_at: None,
@@ -215,6 +224,11 @@ impl Vehicle {
             waits_since: None,
             sums: VehicleSums::default(),
         }
+    }
+
+    /// Returns whether it was ever heard, or missed: until then it is only awaited.
+    pub(super) fn is_awaited(&self) -> bool {
+        !self.is_silent && self.mode.is_none()
     }
 
     /// Returns whether it has reached the end of its route.
@@ -238,15 +252,17 @@ impl Vehicle {
             return None;
         }
         match self.link {
-            Link::Unheard => return Some("has not said that it is connected".into()),
             Link::Known(ConnectionState::Offline) => return Some("has gone offline".into()),
             Link::Known(ConnectionState::ConnectionBroken) => {
                 return Some("has lost its connection".into());
             }
-            Link::Known(ConnectionState::Online) => {}
+            Link::Unheard | Link::Known(ConnectionState::Online) => {}
         }
         if self.is_silent {
             return Some("is silent".into());
+        }
+        if self.link == Link::Unheard {
+            return Some("has not said that it is connected".into());
         }
         let Some(mode) = self.mode else { return Some("has not reported its state".into()) };
         if !mode.accepts_orders() {
@@ -309,7 +325,8 @@ impl Vehicle {
         self.check_sender(&state.header)?;
         let header = state.header.header_id;
         if self.last_header.is_some_and(|last| !is_newer(header, last)) {
-            let detail = format!("header {header} is not newer than {}", self.last_header.unwrap_or(0));
+            let detail =
+                format!("header {header} is not newer than {}", self.last_header.unwrap_or(0));
             return Err(Dropped::new(DropReason::OldHeader, detail));
         }
         self.last_header = Some(header);
@@ -321,10 +338,12 @@ impl Vehicle {
             self.has_old_refusal = false;
         }
         self.confirm_cancellation(state);
+        self.restore_former_order(state);
         match &self.order {
             Some(order) if order.id == state.order_id => self.accept_progress(state, now),
             Some(order) => {
-                let detail = format!("order `{}` in place of `{}`", quote(&state.order_id), order.id);
+                let detail =
+                    format!("order `{}` in place of `{}`", quote(&state.order_id), order.id);
                 if order.was_accepted && !self.is_complete() {
                     self.on_lost_order(state);
                 } else {
@@ -383,8 +402,17 @@ impl Vehicle {
         self.progress = reached;
         if self.is_complete() {
             self.completed_at.get_or_insert(now);
+        } else if self.is_canceled(state) {
+            self.on_lost_order(state);
         }
         Ok(())
+    }
+
+    /// Returns whether a vehicle keeps the name of its order alone: somebody else has canceled it.
+    fn is_canceled(&self, state: &State) -> bool {
+        let Some(order) = &self.order else { return false };
+        let has_all = state.order_update_id == order.update;
+        has_all && self.progress < order.base && state.node_states.is_empty()
     }
 
     /// Returns the node of the route that a state says to be the last one reached.
@@ -441,8 +469,23 @@ impl Vehicle {
 
     /// Takes note that a vehicle has lost an order that it had: it has started again, or somebody has canceled it.
     fn on_lost_order(&mut self, state: &State) {
-        self.order = None;
+        self.former_order = self.order.take();
         self.find_start(state);
+    }
+
+    /// Takes up the order before again, if it turns out that the vehicle still carries it out: what said that it was lost was
+    /// a state from before it had it.
+    fn restore_former_order(&mut self, state: &State) {
+        let is_former =
+            self.former_order.as_ref().is_some_and(|former| former.id == state.order_id);
+        let has_new = self.order.as_ref().is_some_and(|order| order.was_accepted);
+        if !is_former || has_new || state.node_states.is_empty() {
+            return;
+        }
+        self.order = self.former_order.take();
+        self.next_first = None;
+        // It refused the order that was sent in its place.
+        self.has_old_refusal = self.errors.iter().any(is_refusal);
     }
 
     /// Finds the node at which a new order begins: where the vehicle says to be, if that is where it can be.
@@ -479,16 +522,15 @@ impl Vehicle {
         format!("is at {is} of map `{map}`, and has to be at {expected} of map `{}`", self.map_id)
     }
 
-    /// Takes note of the time; returns whether the vehicle has become silent.
-    pub(super) fn note_silence(&mut self, now: Duration, timeout: Duration) -> bool {
+    /// Takes note of the time: whether the vehicle has become silent.
+    pub(super) fn note_silence(&mut self, now: Duration, timeout: Duration) {
         let heard_at = self.heard_at.unwrap_or_default();
         if self.is_silent || now.saturating_sub(heard_at) <= timeout {
-            return false;
+            return;
         }
         self.is_silent = true;
         // It may have started again without a word, and count anew. What it then says still has to fit.
         self.last_header = None;
-        true
     }
 
     /// Takes note whether it stands at the end of its base and has to wait.
