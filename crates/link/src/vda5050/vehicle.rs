@@ -344,7 +344,8 @@ impl Vehicle {
             Some(order) => {
                 let detail =
                     format!("order `{}` in place of `{}`", quote(&state.order_id), order.id);
-                if order.was_accepted && !self.is_complete() {
+                let has_had_it = order.was_accepted || self.is_past_start(order, state);
+                if has_had_it && !self.is_complete() {
                     self.on_lost_order(state);
                 } else {
                     self.misfit = busy(state);
@@ -465,6 +466,15 @@ impl Vehicle {
         let from = self.center_m(node);
         let to = self.center_m((node + 1).min(self.route.last()));
         Some(distance_to_segment([position.x, position.y], from, to))
+    }
+
+    /// Returns whether an idle vehicle is at a node of an order after its first: it has carried it out so far, and started
+    /// again before a state has told that.
+    fn is_past_start(&self, order: &OrderInWork, state: &State) -> bool {
+        let mut after = order.first + 1..=self.released;
+        let is_there = after.any(|node| self.route.nodes[node].id() == state.last_node_id);
+        let start = self.route.nodes[order.first].id();
+        is_there && state.last_node_id != start && state.node_states.is_empty()
     }
 
     /// Takes note that a vehicle has lost an order that it had: it has started again, or somebody has canceled it.
