@@ -312,7 +312,7 @@ impl Master {
     /// Sends what can be sent, and tells who is held and goes on.
     fn advance(&mut self, now: Duration) {
         for number in 0..self.vehicles.len() {
-            if !self.is_cancelled && self.vehicles[number].hold().is_none() {
+            if !self.is_cancelled && self.vehicles[number].barrier().is_none() {
                 self.send_next(number, now);
             }
             self.vehicles[number].note_wait(now);
@@ -543,7 +543,7 @@ impl Master {
                 };
                 self.remark(number, true, format!("{reason}{waiting}"));
             }
-            None if was_held => self.remark(number, false, "gets orders".into()),
+            None if was_held => self.remark(number, false, "goes on".into()),
             None => {}
         }
     }

@@ -14,6 +14,10 @@ use std::time::Duration;
 /// Names of errors by which vehicles refuse an order (VDA 5050, 6.6.4).
 const REFUSALS: [&str; 4] = ["validationError", "orderError", "orderUpdateError", "noRouteError"];
 
+/// Most orders of a vehicle that are kept to be taken up again: each comes of a start of the vehicle, whose states of
+/// before are on their way for seconds.
+const MAX_FORMER_ORDERS: usize = 8;
+
 /// Most letters of a vehicle's text that are told.
 const MAX_QUOTE_CHARS: usize = 80;
 
@@ -170,8 +174,6 @@ pub struct Vehicle {
     is_silent: bool,
     mode: Option<OperatingMode>,
     errors: Vec<VehicleError>,
-    /// Whether it reported a refusal before the present order was sent: that is of an earlier one.
-    has_old_refusal: bool,
     /// Why it cannot begin an order where it is.
     misfit: Option<String>,
     /// The node of the route that it has reached last.
@@ -179,8 +181,8 @@ pub struct Vehicle {
     /// The last node of its route that was ever released to it.
     pub(super) released: usize,
     pub(super) order: Option<OrderInWork>,
-    /// The order before, which it was taken to have lost.
-    former_order: Option<OrderInWork>,
+    /// The last orders before, which it was taken to have lost.
+    former_orders: Vec<OrderInWork>,
     /// The node at which its next order begins, once it is known to be able to begin one.
     next_first: Option<usize>,
     pub(super) cancellation: Option<Cancellation>,
@@ -211,12 +213,11 @@ impl Vehicle {
             is_silent: false,
             mode: None,
             errors: Vec::new(),
-            has_old_refusal: false,
             misfit: None,
             progress: 0,
             released: 0,
             order: None,
-            former_order: None,
+            former_orders: Vec::new(),
             next_first: None,
             cancellation: None,
             begun_at: None,
@@ -247,7 +248,7 @@ impl Vehicle {
     }
 
     /// Returns why it gets no order and no update; none if it gets them.
-    pub(super) fn hold(&self) -> Option<String> {
+    pub(super) fn barrier(&self) -> Option<String> {
         if self.is_complete() {
             return None;
         }
@@ -268,17 +269,19 @@ impl Vehicle {
         if !mode.accepts_orders() {
             return Some(format!("is in the mode {mode:?}"));
         }
-        if let Some(error) = self.errors.iter().find(|error| self.is_severe(error)) {
-            let description = quote(&error.error_description);
-            return Some(format!("reports {} {description}", quote(&error.error_type)));
+        let mut errors = self.errors.iter();
+        if let Some(error) = errors.find(|error| error.error_level == ErrorLevel::Fatal) {
+            return Some(describe(error));
         }
         self.misfit.clone()
     }
 
-    /// Returns whether an error means that the vehicle does not go on, or does not have its order.
-    fn is_severe(&self, error: &VehicleError) -> bool {
-        let is_refusal = is_refusal(error) && self.order.is_some() && !self.has_old_refusal;
-        error.error_level == ErrorLevel::Fatal || is_refusal
+    /// Returns why it does not go on; none if it does. One that has refused an order gets the next all the same: it
+    /// reports that until it has accepted one (VDA 5050, 6.6.4).
+    pub(super) fn hold(&self) -> Option<String> {
+        let refusal = self.errors.iter().find(|error| is_refusal(error));
+        let refusal = refusal.filter(|_| self.order.is_some() && !self.is_complete());
+        self.barrier().or_else(|| refusal.map(describe))
     }
 
     /// Returns the node at which a new order begins, if it can get one.
@@ -288,7 +291,6 @@ impl Vehicle {
 
     /// Takes note that an order was sent.
     pub(super) fn begin_order(&mut self, order: OrderInWork) {
-        self.has_old_refusal = self.errors.iter().any(is_refusal);
         self.begun_at.get_or_insert(order.sent_at);
         self.released = self.released.max(order.base);
         self.order = Some(order);
@@ -334,9 +336,6 @@ impl Vehicle {
         self.is_silent = false;
         self.mode = Some(state.operating_mode);
         self.errors.clone_from(&state.errors);
-        if !self.errors.iter().any(is_refusal) {
-            self.has_old_refusal = false;
-        }
         self.confirm_cancellation(state);
         self.restore_former_order(state);
         match &self.order {
@@ -479,23 +478,27 @@ impl Vehicle {
 
     /// Takes note that a vehicle has lost an order that it had: it has started again, or somebody has canceled it.
     fn on_lost_order(&mut self, state: &State) {
-        self.former_order = self.order.take();
+        self.keep_former_order();
         self.find_start(state);
     }
 
-    /// Takes up the order before again, if it turns out that the vehicle still carries it out: what said that it was lost was
+    fn keep_former_order(&mut self) {
+        self.former_orders.extend(self.order.take());
+        if self.former_orders.len() > MAX_FORMER_ORDERS {
+            self.former_orders.remove(0);
+        }
+    }
+
+    /// Takes up an order before again, if it turns out that the vehicle still carries it out: what said that it was lost was
     /// a state from before it had it.
     fn restore_former_order(&mut self, state: &State) {
-        let is_former =
-            self.former_order.as_ref().is_some_and(|former| former.id == state.order_id);
-        let has_new = self.order.as_ref().is_some_and(|order| order.was_accepted);
-        if !is_former || has_new || state.node_states.is_empty() {
-            return;
-        }
-        self.order = self.former_order.take();
+        let mut formers = self.former_orders.iter();
+        let former = formers.position(|former| former.id == state.order_id);
+        let Some(former) = former.filter(|_| !state.node_states.is_empty()) else { return };
+        let restored = self.former_orders.remove(former);
+        self.keep_former_order();
+        self.order = Some(restored);
         self.next_first = None;
-        // It refused the order that was sent in its place.
-        self.has_old_refusal = self.errors.iter().any(is_refusal);
     }
 
     /// Finds the node at which a new order begins: where the vehicle says to be, if that is where it can be.
@@ -565,6 +568,11 @@ impl Vehicle {
 fn busy(state: &State) -> Option<String> {
     let is_busy = !state.node_states.is_empty();
     is_busy.then(|| format!("carries out another order, `{}`", quote(&state.order_id)))
+}
+
+fn describe(error: &VehicleError) -> String {
+    let description = quote(&error.error_description);
+    format!("reports {} {description}", quote(&error.error_type)).trim_end().to_string()
 }
 
 fn is_refusal(error: &VehicleError) -> bool {
