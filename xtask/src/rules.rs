@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// Packages that only some crates may depend on: each is heavy, or the one way to a format or a network.
 /// `cargo deny` could hold them, but not everybody who runs the tests has it.
-const RESERVED: [(&str, &[&str]); 9] = [
+const RESERVED: [(&str, &[&str]); 10] = [
     ("parquet", &["sidestep-record", "sidestep-import"]),
     ("mcap", &["sidestep-record", "sidestep-import"]),
     ("foxglove", &["sidestep-record"]),
@@ -18,6 +18,7 @@ const RESERVED: [(&str, &[&str]); 9] = [
     ("axum", &["sidestep-server"]),
     ("tokio", &["sidestep-server", "sidestep-workspace-hack"]),
     ("zenoh", &["sidestep-link"]),
+    ("rumqttc", &["sidestep-link"]),
 ];
 
 /// Below it each crate is a world; no other place tells them apart.

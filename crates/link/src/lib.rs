@@ -19,6 +19,7 @@
 //! vehicle/           programs of users that decide in place of an agent's own, over a public wire
 //! node/              the node of an agent
 //! ros2/              a run as a node of ROS 2, without ROS
+//! vda5050/           vehicles of a warehouse that carry out a plan (its broker.rs opens a socket, too)
 //! program/           the process: its job, logs, metrics and child processes
 //! ```
 
@@ -41,6 +42,7 @@ mod robots;
 pub mod ros2;
 pub mod server;
 pub mod signature;
+pub mod vda5050;
 pub mod vehicle;
 pub mod wire;
 pub mod worlds;

@@ -11,6 +11,7 @@ use sidestep_kernel::text::KeyValues;
 use sidestep_kernel::view::{Frame, Scenery};
 use sidestep_kernel::{Cycle, EntityId, InputError};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
@@ -50,6 +51,8 @@ pub enum Job {
     Watch(WatchJob),
     /// Run a scenario as a node of ROS 2.
     Ros2(Ros2Job),
+    /// Let vehicles of a warehouse carry out the plan of a scenario.
+    Dispatch(DispatchJob),
 }
 
 /// The name of an agent, in the form used by people: `airplane 3`, or `connector 0.3` for part 3 of body 0.
@@ -224,6 +227,37 @@ pub struct RosGraph {
     pub services: Vec<(String, String)>,
 }
 
+/// Job of a master control: vehicles of a warehouse (VDA 5050) carry out the plan of a scenario.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DispatchJob {
+    /// The scenario.
+    pub planned: JobScenario,
+    /// The MQTT broker, as `mqtt://HOST:PORT`.
+    pub broker: String,
+    /// Whether the broker may be on another machine, to which the link is not encrypted.
+    pub is_insecure: bool,
+    /// The first level of all topics, e.g. `uagv`.
+    pub interface: String,
+    /// The manufacturer of all vehicles.
+    pub manufacturer: String,
+    /// The serial number of a vehicle is this and the number of its robot.
+    pub serial_prefix: String,
+    /// The name of the map in which places are given.
+    pub map_id: String,
+    /// Nodes after the released ones that a vehicle is told of.
+    pub horizon_nodes: usize,
+    /// Time in seconds without a state after which a vehicle counts as silent.
+    pub silence_s: f64,
+    /// Time in seconds after which an order is sent again that no state has confirmed.
+    pub resend_s: f64,
+    /// Time in seconds without any progress after which the job is given up; never unless given.
+    pub give_up_s: Option<f64>,
+    /// Whether each line of the log is a JSON object.
+    pub json_log: bool,
+    /// The least severe log lines that are written, e.g. `info`.
+    pub log: String,
+}
+
 /// The course of time in a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -300,6 +334,8 @@ pub enum LinkMessage {
         /// The state of the fleet at the end.
         fleet: FleetStatus,
     },
+    /// The present state of the vehicles of a plan; the last such line is that at the end.
+    Dispatch(DispatchStatus),
     /// It could not do its job.
     Failed(JobError),
 }
@@ -413,6 +449,50 @@ pub struct NodeStatus {
     pub bytes_per_s: f64,
     /// Seconds since it was last heard.
     pub silent_s: Option<f64>,
+}
+
+/// The vehicles of a plan at one moment.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct DispatchStatus {
+    /// Seconds since the start.
+    pub elapsed_s: f64,
+    /// Whether all vehicles have reached the ends of their routes.
+    pub is_complete: bool,
+    /// The vehicles, by the numbers of their robots.
+    pub vehicles: Vec<VehicleStatus>,
+    /// Messages that were dropped and are of no vehicle of the plan, by reason.
+    pub dropped: BTreeMap<String, u64>,
+}
+
+/// A vehicle of a plan at one moment.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct VehicleStatus {
+    /// Its serial number.
+    pub serial: String,
+    /// What it does, or why it gets no orders, in words.
+    pub state: String,
+    /// Whether it is at the end of its route.
+    pub is_complete: bool,
+    /// The nodes that it has reached, without its start.
+    pub nodes_done: usize,
+    /// The nodes of its route, without its start.
+    pub nodes: usize,
+    /// Times at which it stood at the end of what was released and had to wait.
+    pub waits: u64,
+    /// Seconds for which it has waited so.
+    pub waited_s: f64,
+    /// Seconds from its first order to the end of its route, or until now.
+    pub time_s: Option<f64>,
+    /// Orders that it was sent: more than one if it has lost one.
+    pub orders: u64,
+    /// Updates of these orders.
+    pub updates: u64,
+    /// Messages that were sent again.
+    pub resent: u64,
+    /// The errors of its last state.
+    pub errors: Vec<String>,
+    /// Its messages that were dropped, by reason.
+    pub dropped: BTreeMap<String, u64>,
 }
 
 impl JobError {

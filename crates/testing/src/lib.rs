@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Says that a test is skipped and why. Where `SIDESTEP_SKIPPED` names a file, it gets a line as well, of
 /// which `cargo xtask test` tells at its end: the output of tests that pass is not shown.
@@ -18,6 +19,30 @@ pub fn skip(why: impl Display) {
         file.and_then(|mut file| file.write_all(format!("{why}\n").as_bytes()))
             .expect("a place for skips");
     }
+}
+
+/// Skips a test that needs a thing, which is missing, with the reason; fails if `SIDESTEP_REQUIRE` names the thing, among
+/// others with commas between.
+///
+/// # Panics
+/// When it is required.
+pub fn require(thing: &str, why: &str) {
+    let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
+    assert!(!required.split(',').any(|word| word.trim() == thing), "{thing} is required: {why}");
+    skip(why);
+}
+
+/// Returns whether Python has some modules, given with commas between; skips the test, or fails where `SIDESTEP_REQUIRE`
+/// names `python`.
+pub fn has_modules(modules: &str) -> bool {
+    let tried = Command::new(python()).args(["-c", &format!("import {modules}")]).output();
+    let said = match tried {
+        Ok(output) if output.status.success() => return true,
+        Ok(output) => String::from_utf8_lossy(&output.stderr).lines().last().unwrap_or("").into(),
+        Err(error) => error.to_string(),
+    };
+    require("python", &format!("python with {modules} is not here: {said}"));
+    false
 }
 
 /// Returns the Python that reads what was written: that of `SIDESTEP_PYTHON`, else `python3`.

@@ -155,11 +155,12 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
         LinkMessage::Ended { summary, outcome, fleet } => {
             end = Some(FleetEnd { topology, summary, outcome, fleet });
         }
-        // `run_job` returns the failure; scenes and views are for watchers.
+        // `run_job` returns the failure; scenes and views are for watchers, the others answer other jobs.
         LinkMessage::Failed(_)
         | LinkMessage::Scene(_)
         | LinkMessage::Seen(_)
-        | LinkMessage::Ros2(_) => {}
+        | LinkMessage::Ros2(_)
+        | LinkMessage::Dispatch(_) => {}
     });
     table.clear();
     if let Some(end) = end {

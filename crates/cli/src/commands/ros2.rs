@@ -167,7 +167,8 @@ pub(crate) fn run_as_node(
         LinkMessage::Failed(_)
         | LinkMessage::Fleet(_)
         | LinkMessage::Scene(_)
-        | LinkMessage::Seen(_) => {}
+        | LinkMessage::Seen(_)
+        | LinkMessage::Dispatch(_) => {}
     });
     if let Some((summary, outcome)) = end {
         print_results(&summary, outcome, console)?;

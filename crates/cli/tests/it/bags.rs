@@ -1,9 +1,10 @@
 //! ROS 2 bags: the export equals the simulation, learning gives back the known errors, and a bag that is
 //! wrong is refused with place, cause and remedy.
 
-use crate::readers::{has, script};
+use crate::readers::script;
 use crate::support::TestFolder;
 use serde_json::{Value, json};
+use sidestep_testing::has_modules;
 use std::path::Path;
 
 /// One robot in a hall where it rarely meets a wall; class edges are in meters from its border.
@@ -212,7 +213,7 @@ fn a_bag_that_is_wrong_is_refused_with_what_is_right() {
 
 #[test]
 fn a_bag_of_another_program_gives_its_robots_wheels_back() {
-    if !has("numpy, rosbags") {
+    if !has_modules("numpy, rosbags") {
         return;
     }
     let place = TestFolder::new();
@@ -232,7 +233,7 @@ fn a_bag_of_another_program_gives_its_robots_wheels_back() {
 
 #[test]
 fn bags_of_another_program_teach_the_same_in_sqlite_packed_by_message_or_as_a_whole() {
-    if !has("numpy, rosbags") {
+    if !has_modules("numpy, rosbags") {
         return;
     }
     let place = TestFolder::new();
@@ -251,7 +252,7 @@ fn bags_of_another_program_teach_the_same_in_sqlite_packed_by_message_or_as_a_wh
 
 #[test]
 fn a_bag_of_another_program_gives_its_scanner_back() {
-    if !has("numpy, rosbags") {
+    if !has_modules("numpy, rosbags") {
         return;
     }
     let place = TestFolder::new();
@@ -268,7 +269,7 @@ fn a_bag_of_another_program_gives_its_scanner_back() {
 
 #[test]
 fn another_program_reads_an_exported_bag_by_the_definitions_of_ros() {
-    if !has("rosbags") {
+    if !has_modules("rosbags") {
         return;
     }
     let place = exported("60");

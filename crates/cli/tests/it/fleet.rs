@@ -1,8 +1,9 @@
 //! Fleets: a process for each airplane, by the program `sidestep-link` where it is built.
 
 use crate::studio::Studio;
-use crate::support::{CommandOutput, TestFolder, requires, signal, wait_for};
+use crate::support::{CommandOutput, TestFolder, signal, wait_for};
 use serde_json::json;
+use sidestep_testing::require;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Child;
@@ -14,7 +15,7 @@ const RING: &str = "format = 1\nworld = \"airspace\"\nseed = 5\ncycles = 12\n[ai
 pub(crate) fn is_there() -> bool {
     let beside = Path::new(env!("CARGO_BIN_EXE_sidestep")).with_file_name("sidestep-link");
     if !beside.is_file() {
-        requires("link", "sidestep-link is not built: cargo build --release -p sidestep-link");
+        require("link", "sidestep-link is not built: cargo build --release -p sidestep-link");
     }
     beside.is_file()
 }
@@ -231,7 +232,7 @@ fn make_certificates(place: &TestFolder, airplanes: usize) -> bool {
     let mut shell = std::process::Command::new("sh");
     let made = shell.args(["-c", &script]).current_dir(place.path("")).output().expect("a shell");
     if !made.status.success() {
-        requires("link", &format!("openssl makes no certificates: {made:?}"));
+        require("link", &format!("openssl makes no certificates: {made:?}"));
     }
     made.status.success()
 }

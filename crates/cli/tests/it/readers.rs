@@ -46,21 +46,6 @@ kind = "superconflict"
 n = 6
 "#;
 
-/// Returns whether the modules are here; says why not, or fails where they must be.
-pub(crate) fn has(modules: &str) -> bool {
-    let tried = Command::new(python()).args(["-c", &format!("import {modules}")]).output();
-    let said = match tried {
-        Ok(output) if output.status.success() => return true,
-        Ok(output) => String::from_utf8_lossy(&output.stderr).lines().last().unwrap_or("").into(),
-        Err(error) => error.to_string(),
-    };
-    let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
-    let is_required = required.split(',').any(|word| word.trim() == "python");
-    assert!(!is_required, "python with {modules} is required: {said}");
-    sidestep_testing::skip(format!("python with {modules} is not here: {said}"));
-    false
-}
-
 /// The output of a script.
 pub(crate) fn script(name: &str, args: &[&Path]) -> Value {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name);
@@ -110,7 +95,7 @@ const FOR_MCAP: &str = "mcap.reader, mcap_protobuf.decoder, pyarrow.parquet";
 
 #[test]
 fn the_mcap_library_reads_robots_where_the_table_has_them() {
-    if !has(FOR_MCAP) {
+    if !has_modules(FOR_MCAP) {
         return;
     }
     let place = TestFolder::new();
@@ -130,7 +115,7 @@ fn the_mcap_library_reads_robots_where_the_table_has_them() {
 
 #[test]
 fn the_mcap_library_reads_robots_on_a_turned_map_where_the_world_has_them() {
-    if !has(FOR_MCAP) {
+    if !has_modules(FOR_MCAP) {
         return;
     }
     let place = TestFolder::new();
@@ -143,7 +128,7 @@ fn the_mcap_library_reads_robots_on_a_turned_map_where_the_world_has_them() {
 
 #[test]
 fn the_mcap_library_reads_chains_where_the_table_has_them() {
-    if !has(FOR_MCAP) {
+    if !has_modules(FOR_MCAP) {
         return;
     }
     let place = TestFolder::new();
@@ -155,7 +140,7 @@ fn the_mcap_library_reads_chains_where_the_table_has_them() {
 
 #[test]
 fn the_mcap_library_reads_airplanes_where_the_table_has_them() {
-    if !has(FOR_MCAP) {
+    if !has_modules(FOR_MCAP) {
         return;
     }
     let place = TestFolder::new();
@@ -201,7 +186,7 @@ appears_s = 40.0
 
 #[test]
 fn the_rows_of_a_run_give_its_separation_to_another_program() {
-    if !has("numpy, pyarrow.parquet") {
+    if !has_modules("numpy, pyarrow.parquet") {
         return;
     }
     let place = TestFolder::new();
@@ -232,7 +217,7 @@ fn the_rows_of_a_run_give_its_separation_to_another_program() {
 
 #[test]
 fn pyarrow_and_polars_read_tables_and_their_exports_alike() {
-    if !has("polars, pyarrow.parquet") {
+    if !has_modules("polars, pyarrow.parquet") {
         return;
     }
     let place = TestFolder::new();

@@ -1,7 +1,7 @@
 //! `reproduce`: a quick run writes a report, its figures and all its numbers.
 
 use crate::browser::{assert_sound, chromium};
-use crate::support::{CommandOutput, TestFolder, names, requires, signal, wait_for};
+use crate::support::{CommandOutput, TestFolder, names, signal, wait_for};
 use serde_json::Value;
 
 /// The names in the folder of a report.
@@ -82,7 +82,7 @@ fn a_rehearsal_of_the_airspace_experiments_measures_over_sockets_or_says_how_to(
         let reason = told["sockets"]["left-out"]["reason"].as_str().expect("a reason");
         assert!(reason.contains("cargo install --path crates/link"), "{reason}");
         assert!(report.contains("Left out"), "{report}");
-        return requires(
+        return require(
             "link",
             "sidestep-link is not built: cargo build --release -p sidestep-link",
         );

@@ -1,7 +1,8 @@
 //! The array of `docs/src/clusters.md` on a real Slurm of one machine.
 
-use crate::support::{TestFolder, requires, wait_for};
+use crate::support::{TestFolder, wait_for};
 use crate::sweep::place;
+use sidestep_testing::require;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -134,7 +135,7 @@ fn an_array_of_tasks_runs_a_sweep_to_the_same_table() {
         ["munged", "slurmctld", "slurmd", "sbatch", "sinfo"].into_iter().find(|p| !has(p));
     if !is_root || missing.is_some() {
         let why = missing.map_or("only root can start Slurm".into(), |p| format!("no `{p}` here"));
-        return requires("slurm", &why);
+        return require("slurm", &why);
     }
     let place: TestFolder = place();
     place.json(&["sweep", "sweep.toml", "--out", "whole"]);

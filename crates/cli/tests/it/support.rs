@@ -223,14 +223,6 @@ fn mount(options: &[&str], at: &Path) -> bool {
     tried.is_ok_and(|o| o.status.success())
 }
 
-/// Skips a test that needs `what`, which is missing, with a message; fails if `SIDESTEP_REQUIRE`
-/// names it.
-pub(crate) fn requires(what: &str, why: &str) {
-    let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
-    assert!(!required.split(',').any(|word| word.trim() == what), "{what} is required: {why}");
-    sidestep_testing::skip(why);
-}
-
 /// Lists the trajectories of another run in the manifest of a run, as if it had recorded them.
 pub(crate) fn list_other_rows(place: &TestFolder, run: &str, other: &str) {
     let read = |run: &str| -> serde_json::Value {

@@ -1,9 +1,10 @@
 //! The motions of arms, exported for controllers of arms: read back by another program, and within the limits of the
 //! joints.
 
-use crate::readers::{has, script};
+use crate::readers::script;
 use crate::support::TestFolder;
 use serde_json::{Value, json};
+use sidestep_testing::has_modules;
 
 const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/chain/arm.urdf");
 
@@ -67,7 +68,7 @@ fn a_trajectory_is_what_the_joints_did_and_keeps_to_their_limits() {
 
 #[test]
 fn another_program_reads_trajectories_by_the_definitions_of_ros() {
-    if !has("rosbags") {
+    if !has_modules("rosbags") {
         return;
     }
     let place = two_arms();
@@ -121,7 +122,7 @@ fn a_bag_of_a_chain_of_robots_has_each_of_them() {
     place.write("c.toml", text);
     place.json(&["run", "c.toml", "--out", "r"]);
     place.json(&["export", "r", "--to", "rosbag", "--out", "bag"]);
-    if !has("rosbags") {
+    if !has_modules("rosbags") {
         return;
     }
     let said = script("read_bag.py", &[&place.path("bag")]);

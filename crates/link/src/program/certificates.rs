@@ -300,7 +300,7 @@ fn check_metrics_address(address: &str) -> Result<(), InputError> {
     Err(InputError::new(format!("--metrics {address}"), cause, remedy))
 }
 
-fn is_of_this_machine(host: &str) -> bool {
+pub(super) fn is_of_this_machine(host: &str) -> bool {
     let address = bare_host(host).parse::<IpAddr>();
     host == "localhost" || address.is_ok_and(|address| address.is_loopback())
 }

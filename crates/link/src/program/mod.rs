@@ -3,6 +3,7 @@
 //! ```text
 //! fleet.rs           the server of a world, with the nodes that it starts (children.rs)
 //! node.rs            one node
+//! dispatch.rs        the master control of vehicles (VDA 5050)
 //! watch.rs           a viewer of a fleet; view.rs: the views at the server
 //! ros2.rs            a run as a node of ROS 2
 //! scenario.rs        the scenario that server and nodes read
@@ -17,6 +18,7 @@
 mod certificates;
 mod children;
 mod denials;
+mod dispatch;
 mod fleet;
 mod log;
 mod metrics;
@@ -121,6 +123,11 @@ fn run_job(job: Job) -> Result<(), Error> {
         Job::Ros2(job) => {
             apply_common_settings(&job.common, job.connect.iter().chain(&job.listen))?;
             ros2::run(&job, &ParentMonitor::watch())
+        }
+        Job::Dispatch(job) => {
+            log::start(job.json_log, &job.log, false)?;
+            check_build(&job.planned.build)?;
+            dispatch::run(&job, &ParentMonitor::watch())
         }
     }
 }

@@ -24,6 +24,8 @@ fn certificates(job: &Job) -> Option<&Tls> {
         Job::Node(job) | Job::Vehicle(VehicleJob { node: job, .. }) => job.common.tls.as_ref(),
         Job::Watch(job) => job.tls.as_ref(),
         Job::Ros2(job) => job.common.tls.as_ref(),
+        // Its link to the broker is none of Zenoh.
+        Job::Dispatch(_) => None,
     }
 }
 

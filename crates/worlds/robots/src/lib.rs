@@ -8,7 +8,7 @@
 //! scenario.rs -> world.rs (immutable), state.rs (columns)
 //! perceive.rs + decide.rs  ->  join.rs  ->  act.rs, auction.rs, simultaneous/   one cycle
 //! plan.rs: before a cycle, the planners of teams (team.rs)      action_progress.rs, long_action.rs: actions of several cycles
-//! errands.rs: the tasks of teams
+//! errands.rs: the tasks of teams      run_plan.rs: the plan of a run without errors, for vehicles
 //! agents.rs: a robot's program outside of a run      remote_agents.rs: its percepts, and the controls that a run takes
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio          watch/: who comes nearer to its goal, and gridlocks
@@ -56,6 +56,7 @@ mod remarks;
 mod remote_agents;
 mod reports;
 pub mod rows;
+mod run_plan;
 pub mod scenario;
 mod simultaneous;
 pub mod state;
@@ -79,6 +80,7 @@ use effector::Side;
 pub use metrics::heap_bytes;
 use policy::ConflictPolicy;
 use progress::GridlockEvent;
+pub use run_plan::RunPlan;
 use sensor::Reading;
 pub use sidestep_error_models::{effector, sensor};
 use sidestep_kernel::conflict::ConflictGroups;
