@@ -4,7 +4,7 @@
 
 use crate::support::TestFolder;
 use serde_json::{Value, json};
-use sidestep_testing::python;
+use sidestep_testing::{has_modules, python};
 use std::path::Path;
 use std::process::Command;
 

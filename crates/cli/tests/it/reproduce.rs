@@ -3,6 +3,7 @@
 use crate::browser::{assert_sound, chromium};
 use crate::support::{CommandOutput, TestFolder, names, signal, wait_for};
 use serde_json::Value;
+use sidestep_testing::require;
 
 /// The names in the folder of a report.
 const WHOLE: [&str; 5] =

@@ -7,27 +7,16 @@ use sidestep_session::fleet::{
     AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Topology, VehicleJob,
 };
 use sidestep_session::{NoWatcher, RecordedRun, replay_all};
-use sidestep_testing::{python, root, skip};
+use sidestep_testing::{has_modules, python, root};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command};
 
 const FLOOR: &str = "format = 1\nworld = \"robots\"\nname = \"floor\"\nseed = 6\ncycles = 40\n[map]\nascii = \"\"\"\n\
     ..........\n..........\n....##....\n..........\n..........\n\"\"\"\n\
     [[robots]]\ncount = 3\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n";
 
-/// Returns whether Python has what a vehicle needs.
-fn has_modules() -> bool {
-    let imports = "import numpy, rosbags.typesys, zenoh";
-    let status = Command::new(python()).args(["-c", imports]).stderr(Stdio::null()).status();
-    let has_all = status.is_ok_and(|status| status.success());
-    if !has_all {
-        skip(format!(
-            "{} has not all of eclipse-zenoh, numpy and rosbags (pip install eclipse-zenoh rosbags)",
-            python().display()
-        ));
-    }
-    has_all
-}
+/// What a vehicle imports.
+const MODULES: &str = "numpy, rosbags.typesys, zenoh";
 
 /// A vehicle that is ended when it is dropped.
 struct Vehicle(Child);
@@ -88,7 +77,7 @@ fn vehicle_job(fleet: &FleetJob, server: &str, endpoint: &str) -> Job {
 
 #[test]
 fn a_vehicle_in_python_joins_a_fleet_in_lockstep_and_decides_in_every_cycle() {
-    if !has_modules() {
+    if !has_modules(MODULES) {
         return;
     }
     let folder = folder(FLOOR);
@@ -109,7 +98,7 @@ fn a_vehicle_in_python_joins_a_fleet_in_lockstep_and_decides_in_every_cycle() {
 
 #[test]
 fn in_real_time_a_vehicle_that_is_gone_makes_its_robot_stand_and_another_one_takes_over() {
-    if !has_modules() {
+    if !has_modules(MODULES) {
         return;
     }
     let folder = folder(&FLOOR.replace("cycles = 40", "cycles = 100000"));
