@@ -119,7 +119,7 @@ pub(crate) fn node(args: &NodeArgs, console: Console) -> Result<ExitCode, Failur
     })?;
     let agent = args.agent();
     let result = match agent.part {
-        None => json!({ agent.noun: agent.number }),
+        None => json!({ agent.noun.as_ref(): agent.number }),
         Some(connector) => json!({ "chain": agent.number, "connector": connector }),
     };
     console.print_result_or_short(&result, "", || {
