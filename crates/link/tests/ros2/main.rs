@@ -165,7 +165,10 @@ fn those_who_join_late_get_the_map_and_the_frames_that_stay() {
     let floor = started(ROBOT).scenery().floor.expect("a floor");
     let map = &seen["map"][0];
     let info = &map["info"];
-    assert_eq!([&info["width"], &info["height"]], [&json!(floor.width + 2), &json!(floor.height + 2)]);
+    assert_eq!(
+        [&info["width"], &info["height"]],
+        [&json!(floor.width + 2), &json!(floor.height + 2)]
+    );
     assert!(is_close(&info["resolution"], floor.box_m));
     assert!(is_close(&info["origin"]["position"]["x"], floor.plane.origin_m[0] - floor.box_m));
     let cells = map["data"].as_array().expect("cells");
@@ -229,9 +232,41 @@ fn a_run_with_a_folder_is_not_reset_and_its_folder_replays() {
     let mut alone = started(&text);
     alone.advance(3);
     assert_eq!(summary["digest"], alone.digest().to_string(), "watching changes nothing");
-    let mut again = sidestep_session::RecordedRun::open(&WORLDS, &node.path("run")).expect("a run");
-    let replayed = sidestep_session::replay_all(&mut again, 1, &sidestep_session::NoWatcher);
+    let again = sidestep_session::RecordedRun::open(&WORLDS, &node.path("run")).expect("a run");
+    let replayed = sidestep_session::replay_all(&again, 1, &sidestep_session::NoWatcher);
     assert!(replayed.is_ok(), "{:?}", replayed.err());
+}
+
+#[test]
+fn velocities_from_outside_are_orders_that_are_recorded_and_replay() {
+    if !has_peer() {
+        return;
+    }
+    let obedient = "effector = \"nomad\"\nbehaviour = { kind = \"external\" }";
+    let text = ROBOT.replace("cycles = 1000000", "cycles = 4").replace("both", "reliable");
+    let text = text.replace("effector = \"nomad\"", obedient);
+    let node = RosProcess::start(&text, |job| Ros2Job {
+        starts_paused: true,
+        out: Some(job.common.flown.file.with_file_name("run")),
+        ..job
+    });
+    let obeys = ("/robot_0/cmd_vel".to_string(), "geometry_msgs/msg/Twist".to_string());
+    assert!(node.graph().topics.contains(&obeys), "{:?}", node.graph());
+    let seen = Peer::new(&node, 0, "/").ask("velocities");
+    let poses: Vec<&Value> = (0..4).map(|k| &seen["odom"][k]["pose"]["pose"]).collect();
+    let yaw_half = std::f64::consts::FRAC_PI_4.sin();
+    for (k, pose) in poses.iter().enumerate() {
+        assert_eq!(xyz(&pose["position"]), [0.25, 0.0, 0.0], "one box ahead, and no more");
+        let turned = if k == 0 { 0.0 } else { yaw_half };
+        assert!(is_close(&pose["orientation"]["z"], turned), "{k}: {pose}");
+    }
+    let summary = node.complete();
+    let again = sidestep_session::RecordedRun::open(&WORLDS, &node.path("run")).expect("a run");
+    let replayed = sidestep_session::replay_all(&again, 1, &sidestep_session::NoWatcher);
+    assert!(replayed.is_ok(), "{:?}", replayed.err());
+    let mut alone = started(&text);
+    alone.advance(4);
+    assert_ne!(summary["digest"], alone.digest().to_string(), "without orders it stays");
 }
 
 #[test]
@@ -325,7 +360,8 @@ fn no_router_is_an_error_that_says_how_to_start_one() {
         ..job
     });
     assert!(failed.remedy.contains("rmw_zenohd"), "{failed:?}");
-    let outside = process::fail(ROBOT, |job| Ros2Job { listen: vec!["tcp/0.0.0.0:0".into()], ..job });
+    let outside =
+        process::fail(ROBOT, |job| Ros2Job { listen: vec!["tcp/0.0.0.0:0".into()], ..job });
     assert!(outside.is_input && outside.remedy.contains("--insecure"), "{outside:?}");
 }
 
