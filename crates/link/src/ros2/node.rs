@@ -328,9 +328,10 @@ impl RosNode {
         let endpoint = RosEndpoint { kind, name: topic.into(), ros_type, quality };
         let token = self.next_token(&endpoint);
         let key = KeyExpr::try_from(self.name.data_key(&endpoint)).map_err(|e| bad_key(&*e))?;
-        let history = match message.is_latched {
-            true => Some(self.declare_history(&endpoint, key.clone())?),
-            false => None,
+        let history = if message.is_latched {
+            Some(self.declare_history(&endpoint, key.clone())?)
+        } else {
+            None
         };
         Ok(Publisher {
             key,

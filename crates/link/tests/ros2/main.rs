@@ -87,9 +87,10 @@ fn a_peer_finds_node_topics_and_services_with_types_hashes_and_qualities_by_toke
         assert_eq!([&topic["node"], &topic["namespace"]], ["sidestep", "/hall"]);
         assert_eq!(topic["reliability"], "RELIABLE");
         let is_latched = ["/hall/map", "/tf_static"].contains(&name);
-        let quality = match is_latched {
-            true => json!(["TRANSIENT_LOCAL", 1]),
-            false => json!(["VOLATILE", if name == "/tf" { 100 } else { 10 }]),
+        let quality = match name {
+            _ if is_latched => json!(["TRANSIENT_LOCAL", 1]),
+            "/tf" => json!(["VOLATILE", 100]),
+            _ => json!(["VOLATILE", 10]),
         };
         assert_eq!(json!([topic["durability"], topic["depth"]]), quality, "{name}");
     }
@@ -138,10 +139,8 @@ fn each_step_sends_what_the_run_has_in_that_cycle() {
         let ranges = scan["ranges"].as_array().expect("ranges");
         assert_eq!(ranges.len(), frame.scans[0].ranges_m.len());
         for (range, range_m) in ranges.iter().zip(&frame.scans[0].ranges_m) {
-            let is_same = match range_m.is_finite() {
-                true => is_close(range, *range_m),
-                false => *range == "inf",
-            };
+            let is_same =
+                if range_m.is_finite() { is_close(range, *range_m) } else { *range == "inf" };
             assert!(is_same, "{range} and {range_m}");
         }
         let tf = &topics["tf"][k]["transforms"][0];
