@@ -221,7 +221,7 @@ pub enum RosDistribution {
 pub struct RosGraph {
     /// The full name of the node.
     pub node: String,
-    /// The topics that it publishes, each with its type, by name.
+    /// The topics that it sends or receives, each with its type, by name.
     pub topics: Vec<(String, String)>,
     /// The services that it has, each with its type.
     pub services: Vec<(String, String)>,

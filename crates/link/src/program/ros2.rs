@@ -28,8 +28,7 @@ pub(super) fn run(job: &Ros2Job, parent: &ParentMonitor) -> Result<(), Error> {
     run.note_removals(&WarningLogger);
     print_message(&LinkMessage::Listens(job.listen.clone()));
     let pace = RunPace { speed: job.speed, starts_paused: job.starts_paused };
-    let mut run =
-        RosRun::start(run, &mut node, pace, &WarningLogger).map_err(|error| run_error(error))?;
+    let mut run = RosRun::start(run, &mut node, pace, &WarningLogger).map_err(run_error)?;
     print_message(&LinkMessage::Ros2(run.graph()));
     let passed = run.pass(&|| parent.has_ended());
     let run = run.into_managed_run();

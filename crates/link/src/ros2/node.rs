@@ -4,22 +4,26 @@ use super::rmw::{
     Attachment, EndpointKind, Gid, QualityOfService, RosEndpoint, RosNodeName, RosType,
     gid_of_token,
 };
-use super::types::{TRIGGER, message_type};
+use super::types::{TRIGGER, TWIST, message_type};
+use super::velocity::Velocity;
 use crate::wire::endpoint::{WireSetupError, without_sources};
 use crate::wire::zenoh::open_ros2_session;
 use sidestep::import::bag::cdr::encode;
 use sidestep::import::bag::messages::TriggerResponse;
+use sidestep::kernel::EntityId;
 use sidestep_session::fleet::{Ros2Job, RosGraph};
 use sidestep_session::ros::RosMessage;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Subscriber;
 use zenoh::query::{Query, Queryable};
+use zenoh::sample::Sample;
 use zenoh::{Session, Wait};
 
 /// The name of the node of a run.
@@ -83,6 +87,20 @@ impl ServiceRequest {
     }
 }
 
+/// What comes in from others.
+#[derive(Debug)]
+pub enum RosInput {
+    /// A request to a service.
+    Request(ServiceRequest),
+    /// A velocity for a robot.
+    Velocity {
+        /// The robot.
+        robot: EntityId,
+        /// What it is asked for.
+        velocity: Velocity,
+    },
+}
+
 /// A message and its attachment as they were sent.
 type SentMessage = (Vec<u8>, Vec<u8>);
 
@@ -109,6 +127,13 @@ struct Publisher {
     _token: LivelinessToken,
 }
 
+/// A subscription to velocities of a robot.
+struct Subscription {
+    topic: String,
+    _subscriber: Subscriber<()>,
+    _token: LivelinessToken,
+}
+
 /// The server of a service.
 struct Server {
     name: String,
@@ -121,10 +146,13 @@ pub struct RosNode {
     name: RosNodeName,
     publishers: BTreeMap<String, Publisher>,
     servers: Vec<Server>,
+    subscriptions: Vec<Subscription>,
     /// Number of topics and services that have had a token.
     endpoints: u32,
-    requests: Receiver<ServiceRequest>,
-    /// Number of requests that were no requests.
+    /// What comes in, in its order.
+    inputs: Receiver<RosInput>,
+    input_sender: Sender<RosInput>,
+    /// Number of requests and messages that were none.
     malformed: Arc<AtomicU64>,
     _token: LivelinessToken,
     session: Session,
@@ -154,20 +182,21 @@ impl RosNode {
             session: session.zid().to_string(),
         };
         let token = declare_token(&session, name.node_token())?;
-        // The sender is kept by the services alone.
-        let (request_sender, requests) = channel();
+        let (input_sender, inputs) = channel();
         let mut node = Self {
             name,
             publishers: BTreeMap::new(),
             servers: Vec::new(),
+            subscriptions: Vec::new(),
             endpoints: 0,
-            requests,
+            inputs,
+            input_sender,
             malformed: Arc::default(),
             _token: token,
             session,
         };
         for service in RunService::ALL {
-            let server = node.serve(service, request_sender.clone())?;
+            let server = node.serve(service)?;
             node.servers.push(server);
         }
         Ok(node)
@@ -175,11 +204,17 @@ impl RosNode {
 
     /// Returns what the node shows by now.
     pub fn graph(&self) -> RosGraph {
-        let topics = self.publishers.iter();
+        let mut topics = BTreeMap::new();
+        for (name, topic) in &self.publishers {
+            topics.insert(name.clone(), topic.type_name.to_string());
+        }
+        for subscription in &self.subscriptions {
+            topics.insert(subscription.topic.clone(), TWIST.name.into());
+        }
         let services = self.servers.iter();
         RosGraph {
             node: self.name.full_name(),
-            topics: topics.map(|(name, topic)| (name.clone(), topic.type_name.into())).collect(),
+            topics: topics.into_iter().collect(),
             services: services.map(|server| (server.name.clone(), TRIGGER.name.into())).collect(),
         }
     }
@@ -209,24 +244,54 @@ impl RosNode {
         put.wait().map_err(|error| closed_session(&*error))
     }
 
-    /// Returns the next request to a service; waits for one at most the given time.
-    pub fn next_request(&self, within: Duration) -> Option<ServiceRequest> {
-        match self.requests.recv_timeout(within) {
-            Ok(request) => Some(request),
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
-        }
+    /// Hears velocities for a robot from now on.
+    ///
+    /// # Errors
+    /// When the session is closed.
+    pub fn hear_velocities(&mut self, robot: EntityId) -> Result<(), WireSetupError> {
+        let topic = self.name.resolve(&format!("robot_{robot}/cmd_vel"));
+        let endpoint = RosEndpoint {
+            kind: EndpointKind::Subscription,
+            name: topic.clone(),
+            ros_type: TWIST,
+            quality: QualityOfService::DEFAULT,
+        };
+        let inputs = self.input_sender.clone();
+        let malformed = self.malformed.clone();
+        let key = self.name.data_key(&endpoint);
+        let subscriber = self.session.declare_subscriber(key).callback(move |sample: Sample| {
+            let Some(velocity) = Velocity::from_twist(&sample.payload().to_bytes()) else {
+                malformed.fetch_add(1, Ordering::Relaxed);
+                return;
+            };
+            // An error means that the node has ended.
+            let _ = inputs.send(RosInput::Velocity { robot, velocity });
+        });
+        let subscriber = subscriber.wait().map_err(|error| closed_session(&*error))?;
+        let token = self.next_token(&endpoint);
+        let token = declare_token(&self.session, token)?;
+        self.subscriptions.push(Subscription { topic, _subscriber: subscriber, _token: token });
+        Ok(())
     }
 
-    /// Returns the number of requests so far that were none: without a proper attachment or in another encoding.
-    pub fn malformed_requests(&self) -> u64 {
+    /// Returns what has come in next; waits for it at most the given time.
+    pub fn next_input(&self, within: Duration) -> Option<RosInput> {
+        // An error means that nothing has come in time: the node itself keeps a sender.
+        self.inputs.recv_timeout(within).ok()
+    }
+
+    /// Returns the number of requests and messages so far that were none: requests without a proper attachment, and what
+    /// is no CDR of its type.
+    pub fn malformed_inputs(&self) -> u64 {
         self.malformed.load(Ordering::Relaxed)
     }
 
     /// Leaves the network: the others see that the node and all that it had is gone.
     pub fn leave(self) {
-        let Self { publishers, servers, session, .. } = self;
+        let Self { publishers, servers, subscriptions, session, .. } = self;
         drop(publishers);
         drop(servers);
+        drop(subscriptions);
         // An error means that it is closed already.
         let _ = session.close().wait();
     }
@@ -263,9 +328,10 @@ impl RosNode {
         let endpoint = RosEndpoint { kind, name: topic.into(), ros_type, quality };
         let token = self.next_token(&endpoint);
         let key = KeyExpr::try_from(self.name.data_key(&endpoint)).map_err(|e| bad_key(&*e))?;
-        let history = match message.is_latched {
-            true => Some(self.declare_history(&endpoint, key.clone())?),
-            false => None,
+        let history = if message.is_latched {
+            Some(self.declare_history(&endpoint, key.clone())?)
+        } else {
+            None
         };
         Ok(Publisher {
             key,
@@ -298,11 +364,7 @@ impl RosNode {
         Ok(History { last, _queryable: queryable, _token: token })
     }
 
-    fn serve(
-        &mut self,
-        service: RunService,
-        requests: Sender<ServiceRequest>,
-    ) -> Result<Server, WireSetupError> {
+    fn serve(&mut self, service: RunService) -> Result<Server, WireSetupError> {
         let name = self.name.resolve_private(service.name());
         let endpoint = RosEndpoint {
             kind: EndpointKind::Service,
@@ -310,6 +372,7 @@ impl RosNode {
             ros_type: TRIGGER,
             quality: QualityOfService::DEFAULT,
         };
+        let inputs = self.input_sender.clone();
         let malformed = self.malformed.clone();
         let key = self.name.data_key(&endpoint);
         // Complete: clients ask only servers that can answer everything on their key.
@@ -317,12 +380,13 @@ impl RosNode {
             let attachment = query.attachment().map(|bytes| bytes.to_bytes());
             let attachment = attachment.and_then(|bytes| Attachment::from_bytes(&bytes));
             let is_cdr = query.payload().is_none_or(|bytes| is_plain_cdr(&bytes.to_bytes()));
-            let (Some(attachment), true) = (attachment, is_cdr) else {
+            let Some(attachment) = attachment.filter(|_| is_cdr) else {
                 malformed.fetch_add(1, Ordering::Relaxed);
                 return;
             };
             // An error means that the node has ended.
-            let _ = requests.send(ServiceRequest { service, query, attachment });
+            let request = ServiceRequest { service, query, attachment };
+            let _ = inputs.send(RosInput::Request(request));
         });
         let queryable = queryable.wait().map_err(|error| closed_session(&*error))?;
         let token = self.next_token(&endpoint);

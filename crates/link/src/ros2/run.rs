@@ -1,7 +1,9 @@
 //! A run that passes at a speed, and that services pause, step and reset.
 
-use super::node::{RosNode, RunService, ServiceRequest};
+use super::node::{RosInput, RosNode, RunService, ServiceRequest};
+use super::velocity::{ACTION_ORDER, VelocityOrders};
 use crate::wire::endpoint::WireSetupError;
+use sidestep::kernel::control::MultiAgentOrder;
 use sidestep_session::fleet::RosGraph;
 use sidestep_session::ros::RunTopics;
 use sidestep_session::{Error, ManagedRun, Pacer, Watcher};
@@ -37,6 +39,7 @@ pub struct RunPace {
 pub struct RosRun<'a> {
     run: ManagedRun,
     topics: RunTopics,
+    velocities: VelocityOrders,
     node: &'a mut RosNode,
     watcher: &'static dyn Watcher,
     /// The state at the start, to which the run is reset.
@@ -44,7 +47,7 @@ pub struct RosRun<'a> {
     cycles_per_s: f64,
     pacer: Pacer,
     is_paused: bool,
-    /// Number of malformed requests that were told.
+    /// Number of malformed inputs that were told.
     told_malformed: u64,
 }
 
@@ -61,6 +64,10 @@ impl<'a> RosRun<'a> {
     ) -> Result<Self, RosRunError> {
         let start = run.checkpoint().map_err(Error::from)?;
         let topics = RunTopics::start(run.simulation_mut());
+        let velocities = VelocityOrders::new(run.simulation());
+        for robot in velocities.robots() {
+            node.hear_velocities(robot)?;
+        }
         let cycle_s = run.simulation().scenery().cycle_s;
         let cycles_per_s = pace.speed / cycle_s;
         let pacer = Pacer::new(cycles_per_s, Instant::now(), run.cycle());
@@ -69,6 +76,7 @@ impl<'a> RosRun<'a> {
         let mut started = Self {
             run,
             topics,
+            velocities,
             node,
             watcher,
             start,
@@ -96,10 +104,14 @@ impl<'a> RosRun<'a> {
             if has_to_end() {
                 return Err(RosRunError::Interrupted);
             }
-            if let Some(request) = self.node.next_request(self.wait()) {
-                self.handle(request)?;
+            match self.node.next_input(self.wait()) {
+                Some(RosInput::Request(request)) => self.handle(request)?,
+                Some(RosInput::Velocity { robot, velocity }) => {
+                    self.velocities.receive(robot, velocity, Instant::now());
+                }
+                None => {}
             }
-            self.tell_malformed_requests();
+            self.tell_malformed_inputs();
             self.advance_to_due_cycle()?;
         }
         Ok(())
@@ -137,8 +149,26 @@ impl<'a> RosRun<'a> {
     }
 
     fn advance(&mut self) -> Result<(), RosRunError> {
+        self.give_orders()?;
         self.run.advance_to(self.run.cycle() + 1, self.watcher)?;
         self.publish()
+    }
+
+    /// Orders the actions of the next cycle that velocities ask for.
+    fn give_orders(&mut self) -> Result<(), RosRunError> {
+        let orders = self.velocities.orders(Instant::now());
+        if orders.robots.is_empty() {
+            return Ok(());
+        }
+        let order = MultiAgentOrder {
+            order: ACTION_ORDER,
+            agents: &orders.robots,
+            values: &orders.actions,
+        };
+        let given = self.run.order(&order);
+        let bug = "please report it with the scenario: this is a bug";
+        given.map_err(|error| Error::other(error.to_string(), bug))?;
+        Ok(())
     }
 
     fn publish(&mut self) -> Result<(), RosRunError> {
@@ -185,6 +215,8 @@ impl<'a> RosRun<'a> {
     /// With the reason for the client.
     fn reset(&mut self) -> Result<(), String> {
         self.run.restore(&self.start).map_err(|error| error.to_string())?;
+        // Velocities were for where the robots were.
+        self.velocities.clear();
         self.restart_clock();
         Ok(())
     }
@@ -193,13 +225,13 @@ impl<'a> RosRun<'a> {
         self.pacer = Pacer::new(self.cycles_per_s, Instant::now(), self.run.cycle());
     }
 
-    fn tell_malformed_requests(&mut self) {
-        let malformed = self.node.malformed_requests();
+    fn tell_malformed_inputs(&mut self) {
+        let malformed = self.node.malformed_inputs();
         if malformed > self.told_malformed {
             self.told_malformed = malformed;
             tracing::warn!(
-                "{malformed} requests to services were dropped: they have no attachment as rmw_zenoh sends it, or \
-                 their content is no CDR"
+                "{malformed} requests and velocities were dropped: they have no attachment as rmw_zenoh sends it, or \
+                 their content is no CDR of finite numbers"
             );
         }
     }

@@ -7,7 +7,7 @@
 
 use super::rmw::RosType;
 
-/// The types of the messages of runs, by name.
+/// The types of the messages that runs send, by name.
 pub const MESSAGE_TYPES: [RosType; 9] = [
     RosType {
         name: "geometry_msgs/msg/PoseStamped",
@@ -51,6 +51,12 @@ pub const MESSAGE_TYPES: [RosType; 9] = [
 pub const TRIGGER: RosType = RosType {
     name: "std_srvs/srv/Trigger",
     hash: "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
+};
+
+/// The velocity that a robot is asked for.
+pub const TWIST: RosType = RosType {
+    name: "geometry_msgs/msg/Twist",
+    hash: "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
 };
 
 /// Returns the type of messages with a name.

@@ -87,9 +87,10 @@ fn a_peer_finds_node_topics_and_services_with_types_hashes_and_qualities_by_toke
         assert_eq!([&topic["node"], &topic["namespace"]], ["sidestep", "/hall"]);
         assert_eq!(topic["reliability"], "RELIABLE");
         let is_latched = ["/hall/map", "/tf_static"].contains(&name);
-        let quality = match is_latched {
-            true => json!(["TRANSIENT_LOCAL", 1]),
-            false => json!(["VOLATILE", if name == "/tf" { 100 } else { 10 }]),
+        let quality = match name {
+            _ if is_latched => json!(["TRANSIENT_LOCAL", 1]),
+            "/tf" => json!(["VOLATILE", 100]),
+            _ => json!(["VOLATILE", 10]),
         };
         assert_eq!(json!([topic["durability"], topic["depth"]]), quality, "{name}");
     }
@@ -138,10 +139,8 @@ fn each_step_sends_what_the_run_has_in_that_cycle() {
         let ranges = scan["ranges"].as_array().expect("ranges");
         assert_eq!(ranges.len(), frame.scans[0].ranges_m.len());
         for (range, range_m) in ranges.iter().zip(&frame.scans[0].ranges_m) {
-            let is_same = match range_m.is_finite() {
-                true => is_close(range, *range_m),
-                false => *range == "inf",
-            };
+            let is_same =
+                if range_m.is_finite() { is_close(range, *range_m) } else { *range == "inf" };
             assert!(is_same, "{range} and {range_m}");
         }
         let tf = &topics["tf"][k]["transforms"][0];
@@ -232,9 +231,41 @@ fn a_run_with_a_folder_is_not_reset_and_its_folder_replays() {
     let mut alone = started(&text);
     alone.advance(3);
     assert_eq!(summary["digest"], alone.digest().to_string(), "watching changes nothing");
-    let mut again = sidestep_session::RecordedRun::open(&WORLDS, &node.path("run")).expect("a run");
-    let replayed = sidestep_session::replay_all(&mut again, 1, &sidestep_session::NoWatcher);
+    let again = sidestep_session::RecordedRun::open(&WORLDS, &node.path("run")).expect("a run");
+    let replayed = sidestep_session::replay_all(&again, 1, &sidestep_session::NoWatcher);
     assert!(replayed.is_ok(), "{:?}", replayed.err());
+}
+
+#[test]
+fn velocities_from_outside_are_orders_that_are_recorded_and_replay() {
+    if !has_peer() {
+        return;
+    }
+    let obedient = "effector = \"nomad\"\nbehaviour = { kind = \"external\" }";
+    let text = ROBOT.replace("cycles = 1000000", "cycles = 4").replace("both", "reliable");
+    let text = text.replace("effector = \"nomad\"", obedient);
+    let node = RosProcess::start(&text, |job| Ros2Job {
+        starts_paused: true,
+        out: Some(job.common.flown.file.with_file_name("run")),
+        ..job
+    });
+    let obeys = ("/robot_0/cmd_vel".to_string(), "geometry_msgs/msg/Twist".to_string());
+    assert!(node.graph().topics.contains(&obeys), "{:?}", node.graph());
+    let seen = Peer::new(&node, 0, "/").ask("velocities");
+    let poses: Vec<&Value> = (0..4).map(|k| &seen["odom"][k]["pose"]["pose"]).collect();
+    let yaw_half = std::f64::consts::FRAC_PI_4.sin();
+    for (k, pose) in poses.iter().enumerate() {
+        assert_eq!(xyz(&pose["position"]), [0.25, 0.0, 0.0], "one box ahead, and no more");
+        let turned = if k == 0 { 0.0 } else { yaw_half };
+        assert!(is_close(&pose["orientation"]["z"], turned), "{k}: {pose}");
+    }
+    let summary = node.complete();
+    let again = sidestep_session::RecordedRun::open(&WORLDS, &node.path("run")).expect("a run");
+    let replayed = sidestep_session::replay_all(&again, 1, &sidestep_session::NoWatcher);
+    assert!(replayed.is_ok(), "{:?}", replayed.err());
+    let mut alone = started(&text);
+    alone.advance(4);
+    assert_ne!(summary["digest"], alone.digest().to_string(), "without orders it stays");
 }
 
 #[test]

@@ -12,6 +12,7 @@ import time
 
 from rosbags.typesys import Stores, get_typestore
 from zenoh_ros2_sdk import (
+    ROS2Publisher,
     ROS2ServiceClient,
     ROS2Subscriber,
     ZenohSession,
@@ -214,6 +215,27 @@ def reset_between_steps():
     return {"reset": reset, "steps": [run.call("step") for _ in range(2)]}
 
 
+def velocities():
+    """A box ahead, a quarter turn to the left, nothing, and what is no velocity."""
+    odom = Topic(f"{NAMESPACE}/robot_0/odom", "nav_msgs/msg/Odometry")
+    twist = "geometry_msgs/msg/Twist"
+    publisher = ROS2Publisher(
+        f"{NAMESPACE}/robot_0/cmd_vel",
+        twist,
+        msg_definition=TYPES.generate_msgdef(twist)[0],
+        type_hash=TYPES.hash_rihs01(twist),
+        **AT,
+    )
+    wait_for("the subscription", lambda: publisher.pub.matching_status.matching)
+    vector = publisher.session_mgr.store.types["geometry_msgs/msg/Vector3"]
+    run = Services()
+    for ahead_m_s, turn_rad_s in [(0.25, 0.0), (0.0, 1.5), (0.01, 0.0), (float("nan"), 0.0)]:
+        linear = vector(x=ahead_m_s, y=0.0, z=0.0)
+        publisher.publish(linear=linear, angular=vector(x=0.0, y=0.0, z=turn_rad_s))
+        run.call("step")
+    return {"odom": odom.wait_for(4)}
+
+
 def joints():
     """The first step of a paused run of chains."""
     states = Topic(f"{NAMESPACE}/chain_0/joint_states", "sensor_msgs/msg/JointState")
@@ -236,6 +258,7 @@ WHAT = {
     "late": late,
     "services": services,
     "reset_between_steps": reset_between_steps,
+    "velocities": velocities,
     "joints": joints,
     "airplanes": airplanes,
 }
