@@ -8,6 +8,7 @@ use crate::scenario_args::ScenarioArgs;
 use crate::worlds;
 use clap::Args;
 use serde_json::json;
+use sidestep::kernel::InputError;
 use sidestep_session::fleet::{
     DispatchJob, DispatchStatus, Job, JobScenario, LinkMessage, VehicleStatus,
 };
@@ -102,6 +103,7 @@ fn parse_level(text: &str) -> Result<String, String> {
 /// # Errors
 /// When the scenario has no plan, the broker is not there, or vehicles do not go on.
 pub(crate) fn dispatch(args: &DispatchArgs, console: Console) -> Result<ExitCode, Failure> {
+    args.check_unused()?;
     let mut end: Option<DispatchStatus> = None;
     let bar = StageBar::new(console);
     let result = run_job(&Job::Dispatch(args.job()), |message| {
@@ -133,6 +135,19 @@ fn share_done(now: &DispatchStatus) -> f64 {
 }
 
 impl DispatchArgs {
+    /// Refuses options of scenarios that have no effect here.
+    ///
+    /// # Errors
+    /// When one is given.
+    fn check_unused(&self) -> Result<(), InputError> {
+        self.scenario.import.check_none("no file of air traffic has vehicles on a floor")?;
+        if self.scenario.changes.regime.is_some() {
+            let cause = "the plan is that of a run without errors; vehicles err in their own ways";
+            return Err(InputError::new("--regime", cause, "leave it out"));
+        }
+        Ok(())
+    }
+
     fn job(&self) -> DispatchJob {
         DispatchJob {
             planned: JobScenario {

@@ -10,6 +10,7 @@ mod commands;
 mod contract;
 mod determinism;
 mod disk;
+mod dispatch;
 mod exact;
 mod export;
 mod fk;

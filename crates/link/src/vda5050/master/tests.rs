@@ -27,8 +27,11 @@ fn config() -> MasterConfig {
     }
 }
 
+/// Start and goal of a vehicle: column and row.
+type StartAndGoal = ((u32, u32), (u32, u32));
+
 /// Returns the routes of vehicles with these starts and goals in a hall with a pillar.
-fn hall_routes(places: &[((u32, u32), (u32, u32))]) -> Vec<Route> {
+fn hall_routes(places: &[StartAndGoal]) -> Vec<Route> {
     let free = FreeSpace::new(5, 4, |col, row| (col, row) != (2, 1));
     let agents = places.iter().map(|&(start, goal)| Agent {
         size: 1,
@@ -268,7 +271,7 @@ impl Hall {
             16 if !self.orders[number].is_empty() => {
                 self.orders[number].remove(0);
             }
-            17 if what.which % 4 == 0 => {
+            17 if what.which.is_multiple_of(4) => {
                 self.orders[number].clear();
                 self.trucks[number].restart();
                 self.connect(number);
@@ -344,7 +347,7 @@ fn happenings(kinds: std::ops::Range<u8>) -> impl Strategy<Value = Vec<Happening
 }
 
 /// Starts and goals of some vehicles, none of which share a place.
-fn places() -> impl Strategy<Value = Vec<((u32, u32), (u32, u32))>> {
+fn places() -> impl Strategy<Value = Vec<StartAndGoal>> {
     let all: Vec<(u32, u32)> = (0..5)
         .flat_map(|col| (0..4).map(move |row| (col, row)))
         .filter(|&place| place != (2, 1))
