@@ -6,13 +6,17 @@
 
 mod process;
 
-use process::{Peer, RosProcess, has_peer, job};
+use process::{Peer, RosProcess, job};
 use serde_json::{Value, json};
 use sidestep::kernel::view::{Frame, FrameOptions, Occupancy};
 use sidestep::kernel::{Cycle, Simulation};
 use sidestep::scenario::Source;
 use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{Ros2Job, RosDistribution};
+use sidestep_testing::has_modules;
+
+/// What the peer is made of.
+const PEER: &str = "rosbags, zenoh_ros2_sdk";
 
 /// One robot with eight beams in two rooms with a door.
 const ROBOT: &str = "format = 1\nworld = \"robots\"\nseed = 3\ncycles = 1000000\nregime = \"both\"\n\
@@ -55,7 +59,7 @@ fn xyz(value: &Value) -> [f64; 3] {
 
 #[test]
 fn a_peer_finds_node_topics_and_services_with_types_hashes_and_qualities_by_tokens() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let node = RosProcess::start(ROBOT, |job| Ros2Job {
@@ -107,7 +111,7 @@ fn a_peer_finds_node_topics_and_services_with_types_hashes_and_qualities_by_toke
 
 #[test]
 fn each_step_sends_what_the_run_has_in_that_cycle() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let node = RosProcess::start(ROBOT, |job| Ros2Job { starts_paused: true, ..job });
@@ -153,7 +157,7 @@ fn each_step_sends_what_the_run_has_in_that_cycle() {
 
 #[test]
 fn those_who_join_late_get_the_map_and_the_frames_that_stay() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let node = RosProcess::start(ROBOT, |job| Ros2Job { speed: 50.0, ..job });
@@ -191,7 +195,7 @@ fn those_who_join_late_get_the_map_and_the_frames_that_stay() {
 
 #[test]
 fn services_pause_step_reset_and_resume_time() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let node = RosProcess::start(ROBOT, |job| Ros2Job { speed: 20.0, ..job });
@@ -213,7 +217,7 @@ fn services_pause_step_reset_and_resume_time() {
 
 #[test]
 fn a_run_with_a_folder_is_not_reset_and_its_folder_replays() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let text = ROBOT.replace("cycles = 1000000", "cycles = 3");
@@ -238,7 +242,7 @@ fn a_run_with_a_folder_is_not_reset_and_its_folder_replays() {
 
 #[test]
 fn velocities_from_outside_are_orders_that_are_recorded_and_replay() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let obedient = "effector = \"nomad\"\nbehaviour = { kind = \"external\" }";
@@ -270,7 +274,7 @@ fn velocities_from_outside_are_orders_that_are_recorded_and_replay() {
 
 #[test]
 fn chains_have_joints_and_frames() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let node = RosProcess::start(CHAIN, |job| Ros2Job { starts_paused: true, ..job });
@@ -296,7 +300,7 @@ fn chains_have_joints_and_frames() {
 
 #[test]
 fn airplanes_have_poses_and_shapes() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let node = RosProcess::start(AIRPLANES, |job| Ros2Job { starts_paused: true, ..job });
@@ -314,7 +318,7 @@ fn airplanes_have_poses_and_shapes() {
 
 #[test]
 fn a_humble_peer_gets_keys_without_hashes() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let node = RosProcess::start(ROBOT, |job| Ros2Job {
@@ -330,7 +334,7 @@ fn a_humble_peer_gets_keys_without_hashes() {
 
 #[test]
 fn a_node_joins_a_router_that_runs_already_and_a_taken_port_is_said() {
-    if !has_peer() {
+    if !has_modules(PEER) {
         return;
     }
     let router = RosProcess::start(ROBOT, |job| Ros2Job { starts_paused: true, ..job });

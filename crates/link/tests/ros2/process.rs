@@ -158,18 +158,3 @@ impl Peer {
         serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{what}: {e}: {error}"))
     }
 }
-
-/// Returns whether the packages of the peer are here; says why not, or fails where they must be.
-pub(crate) fn has_peer() -> bool {
-    let tried = Command::new(python()).args(["-c", "import zenoh_ros2_sdk, rosbags"]).output();
-    let said = match tried {
-        Ok(output) if output.status.success() => return true,
-        Ok(output) => String::from_utf8_lossy(&output.stderr).lines().last().unwrap_or("").into(),
-        Err(error) => error.to_string(),
-    };
-    let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
-    let is_required = required.split(',').any(|word| word.trim() == "python");
-    assert!(!is_required, "python with zenoh_ros2_sdk and rosbags is required: {said}");
-    sidestep_testing::skip(format!("python with zenoh_ros2_sdk and rosbags is not here: {said}"));
-    false
-}

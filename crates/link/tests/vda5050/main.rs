@@ -6,7 +6,8 @@
 mod support;
 
 use serde_json::json;
-use support::{Hall, Plant, PlantTask, broker, has_python};
+use sidestep_testing::has_modules;
+use support::{Hall, Plant, PlantTask, broker};
 
 /// Five robots that go to and fro around a block of shelves, past each other.
 const ROBOTS: &str = "count = 5\nat = [[0, 0, 0], [1, 0, 0], [6, 2, 2], [5, 2, 2], [3, 0, 0]]\n\
@@ -15,7 +16,7 @@ const ROBOTS: &str = "count = 5\nat = [[0, 0, 0], [1, 0, 0], [6, 2, 2], [5, 2, 2
 #[test]
 fn vehicles_with_losses_a_restart_a_refusal_and_forged_states_carry_out_a_plan_in_its_order() {
     let Some(broker) = broker() else { return };
-    if !has_python() {
+    if !has_modules("paho.mqtt.client") {
         return;
     }
     let hall = Hall::new(ROBOTS, 40);
@@ -61,7 +62,7 @@ fn vehicles_with_losses_a_restart_a_refusal_and_forged_states_carry_out_a_plan_i
 #[test]
 fn a_vehicle_that_falls_silent_holds_those_behind_it_and_is_named() {
     let Some(broker) = broker() else { return };
-    if !has_python() {
+    if !has_modules("paho.mqtt.client") {
         return;
     }
     let hall = Hall::new(ROBOTS, 40);
@@ -88,7 +89,7 @@ fn a_vehicle_that_falls_silent_holds_those_behind_it_and_is_named() {
 #[test]
 fn when_it_is_interrupted_the_orders_of_all_vehicles_are_canceled() {
     let Some(broker) = broker() else { return };
-    if !has_python() {
+    if !has_modules("paho.mqtt.client") {
         return;
     }
     let hall = Hall::new(ROBOTS, 40);

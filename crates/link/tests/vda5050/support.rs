@@ -8,7 +8,7 @@ use sidestep_link::vda5050::routes::{FloorFrame, Route, routes};
 use sidestep_session::fleet::{
     DispatchJob, DispatchStatus, Job, JobError, JobScenario, LinkMessage, link_command,
 };
-use sidestep_testing::{python, skip};
+use sidestep_testing::{python, require, skip};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -21,13 +21,6 @@ use tempfile::TempDir;
 const TEST_TIMEOUT: Duration = Duration::from_secs(240);
 
 const BOX_M: f64 = 0.5;
-
-/// Skips a test for a reason; fails where `SIDESTEP_REQUIRE` has the word.
-fn require(word: &str, why: &str) {
-    let required = std::env::var("SIDESTEP_REQUIRE").unwrap_or_default();
-    assert!(!required.split(',').any(|one| one.trim() == word), "{word} is required: {why}");
-    skip(why);
-}
 
 /// A broker of this machine, killed when it is dropped.
 pub(crate) struct Mosquitto {
@@ -73,16 +66,6 @@ pub(crate) fn broker() -> Option<Mosquitto> {
         std::thread::sleep(Duration::from_millis(10));
     }
     Some(mosquitto)
-}
-
-/// Returns whether Python has what the vehicles need.
-pub(crate) fn has_python() -> bool {
-    let tried = Command::new(python()).args(["-c", "import paho.mqtt.client"]).output();
-    if tried.is_ok_and(|tried| tried.status.success()) {
-        return true;
-    }
-    require("python", "python with paho-mqtt is not here");
-    false
 }
 
 /// A hall with robots and their plan.
