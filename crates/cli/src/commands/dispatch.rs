@@ -17,12 +17,11 @@ use std::collections::BTreeMap;
 const EXAMPLES: &str = "\
 Examples:
   sidestep dispatch hall.toml --vda5050 mqtt://127.0.0.1:1883
-  sidestep dispatch hall.toml --vda5050 mqtt://127.0.0.1:1883 --manufacturer acme \\
-      --serial-prefix truck- --map-id hall-3
+  sidestep dispatch hall.toml --vda5050 mqtt://127.0.0.1:1883 \\
+      --manufacturer acme --serial-prefix truck- --map-id hall-3
                                    robot 0 is the vehicle acme/truck-0, and so on
-  sidestep dispatch hall.toml --vda5050 mqtt://127.0.0.1:1883 --log info --give-up 60
-                                   tells what vehicles do; ends when nobody has
-                                   gone on for a minute
+  sidestep dispatch hall.toml --vda5050 mqtt://127.0.0.1:1883 --give-up 60
+                                   ends when nobody has gone on for a minute
 
 The scenario is one of robots that planners lead; the plan is its run without errors (see the \
 chapter \"Vehicles by VDA 5050\" of the book for what is promised and what is not). Ctrl-C cancels \

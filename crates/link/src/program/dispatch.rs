@@ -8,6 +8,7 @@ use crate::vda5050::master::{Master, MasterConfig, Remark};
 use crate::vda5050::routes::{FloorFrame, Route, routes};
 use sidestep::kernel::InputError;
 use sidestep::planners::DependencyGraph;
+use sidestep::scenario::{CompiledScenario, Source};
 use sidestep::worlds::{WORLDS, robots};
 use sidestep_session::Error;
 use sidestep_session::fleet::{DispatchJob, JobScenario, LinkMessage};
@@ -77,15 +78,14 @@ struct PlannedFleet {
 /// # Errors
 /// When it has none, or none that vehicles can carry out.
 fn plan(planned: &JobScenario) -> Result<PlannedFleet, InputError> {
+    let as_given = sidestep_session::read_scenario(&WORLDS, &planned.file, &planned.overrides)?;
+    // Another world has no regime, and says so first.
+    as_robots(&as_given.0, as_given.1.as_ref())?;
     let mut overrides = planned.overrides.clone();
     // Vehicles err in their own way: what the plan needs is the order of the robots.
     overrides.push("regime=\"reliable\"".to_string());
     let (source, compiled) = sidestep_session::read_scenario(&WORLDS, &planned.file, &overrides)?;
-    let Some(robots) = compiled.as_any().downcast_ref::<robots::scenario::Compiled>() else {
-        let cause = format!("the world `{}` has no vehicles on a grid", compiled.world());
-        let remedy = "give a scenario with world = \"robots\" and a planner";
-        return Err(InputError::new(&source.place, cause, remedy));
-    };
+    let robots = as_robots(&source, compiled.as_ref())?;
     let planned = robots.run_plan(&source)?;
     let internal = |cause: String| InputError::new(&source.place, cause, "report this as a bug");
     let graph = DependencyGraph::new(&planned.instance, &planned.plan);
@@ -97,6 +97,21 @@ fn plan(planned: &JobScenario) -> Result<PlannedFleet, InputError> {
     })?;
     let map = &robots.world.map;
     Ok(PlannedFleet { routes, floor: FloorFrame { box_m: map.box_size_m, plane: map.plane } })
+}
+
+/// Returns a scenario of robots.
+///
+/// # Errors
+/// When it is of another world.
+fn as_robots<'a>(
+    source: &Source,
+    compiled: &'a dyn CompiledScenario,
+) -> Result<&'a robots::scenario::Compiled, InputError> {
+    compiled.as_any().downcast_ref().ok_or_else(|| {
+        let cause = format!("the world `{}` has no vehicles on a grid", compiled.world());
+        let remedy = "give a scenario with world = \"robots\" and a planner";
+        InputError::new(&source.place, cause, remedy)
+    })
 }
 
 /// A master control and its broker.
