@@ -159,7 +159,9 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
         LinkMessage::Failed(_)
         | LinkMessage::Scene(_)
         | LinkMessage::Seen(_)
-        | LinkMessage::Ros2(_) => {}
+        | LinkMessage::Ros2(_)
+        | LinkMessage::Drives(_)
+        | LinkMessage::Driven(_) => {}
     });
     table.clear();
     if let Some(end) = end {

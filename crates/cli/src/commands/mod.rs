@@ -5,6 +5,7 @@ mod arm_picture;
 mod check;
 mod compare;
 mod completions;
+mod drive;
 mod exact;
 mod export;
 mod finish;
@@ -36,7 +37,7 @@ use clap::Subcommand;
 pub(crate) const GROUPS: &[(&str, &[&str])] = &[
     ("Prepare", &["new", "check", "schema", "inspect", "map", "learn"]),
     ("Run and look at it", &["run", "studio", "resume", "replay", "verify", "report", "export"]),
-    ("Fly on a network", &["fleet", "node"]),
+    ("Fly on a network", &["fleet", "node", "drive"]),
     ("Study", &["sweep", "compare", "exact", "reproduce"]),
     ("Robot arms", &["fk", "ik"]),
     ("This command", &["completions", "man"]),
@@ -53,6 +54,8 @@ pub(crate) enum Command {
     Fleet(Box<fleet::FleetArgs>),
     /// Run one airplane, connector or robot of a fleet on this machine
     Node(Box<node::NodeArgs>),
+    /// Drive a real robot of ROS 2 by the program of a robot of a scenario
+    Drive(Box<drive::DriveArgs>),
     /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),
     /// Create a commented scenario as a starting point
@@ -103,6 +106,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Studio(args) => studio::studio(&args, *console),
         Command::Fleet(args) => fleet::fleet(&args, *console),
         Command::Node(args) => node::node(&args, *console),
+        Command::Drive(args) => drive::drive(&args, *console),
         Command::Check(args) => check::check(&args, *console),
         Command::New(args) => new::new(&args, *console),
         Command::Schema(args) => schema::schema(&args, *console),

@@ -5,6 +5,7 @@
 //! node.rs            one node
 //! watch.rs           a viewer of a fleet; view.rs: the views at the server
 //! ros2.rs            a run as a node of ROS 2
+//! drive.rs           a real robot that is driven by ROS 2
 //! scenario.rs        the scenario that server and nodes read
 //! certificates.rs    checks of certificates; denials.rs: what they do not allow, for the log
 //! one_thread.rs      the one thread of the network that encrypted links need
@@ -17,6 +18,7 @@
 mod certificates;
 mod children;
 mod denials;
+mod drive;
 mod fleet;
 mod log;
 mod metrics;
@@ -42,8 +44,8 @@ use std::process::ExitCode;
 
 /// Usage, for a user who starts the program by hand.
 const USAGE: &str = "\
-sidestep-link runs the server and the nodes of a fleet, and shows runs to ROS 2. `sidestep fleet`, `sidestep node` and
-`sidestep run --ros2` start it and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
+sidestep-link runs the server and the nodes of a fleet, shows runs to ROS 2, and drives robots. `sidestep fleet`,
+`sidestep node`, `sidestep run --ros2` and `sidestep drive` start it and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
 
 /// Does the job that standard input asks for. Exit codes are those of `sidestep`.
 pub fn main() -> ExitCode {
@@ -121,6 +123,11 @@ fn run_job(job: Job) -> Result<(), Error> {
         Job::Ros2(job) => {
             apply_common_settings(&job.common, job.connect.iter().chain(&job.listen))?;
             ros2::run(&job, &ParentMonitor::watch())
+        }
+        Job::Drive(job) => {
+            let network = &job.network;
+            apply_common_settings(&job.common, network.connect.iter().chain(&network.listen))?;
+            drive::run(&job, &ParentMonitor::watch())
         }
     }
 }

@@ -24,6 +24,7 @@ fn certificates(job: &Job) -> Option<&Tls> {
         Job::Node(job) | Job::Vehicle(VehicleJob { node: job, .. }) => job.common.tls.as_ref(),
         Job::Watch(job) => job.tls.as_ref(),
         Job::Ros2(job) => job.common.tls.as_ref(),
+        Job::Drive(job) => job.common.tls.as_ref(),
     }
 }
 

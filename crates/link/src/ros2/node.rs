@@ -9,7 +9,7 @@ use crate::wire::endpoint::{WireSetupError, without_sources};
 use crate::wire::zenoh::open_ros2_session;
 use sidestep::import::bag::cdr::encode;
 use sidestep::import::bag::messages::TriggerResponse;
-use sidestep_session::fleet::{Ros2Job, RosGraph};
+use sidestep_session::fleet::{Ros2Job, RosGraph, RosNetwork};
 use sidestep_session::ros::RosMessage;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -19,7 +19,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
-use zenoh::query::{Query, Queryable};
+use zenoh::pubsub::Subscriber;
+use zenoh::query::{Query, Queryable, ReplyKeyExpr};
 use zenoh::{Session, Wait};
 
 /// The name of the node of a run.
@@ -109,6 +110,14 @@ struct Publisher {
     _token: LivelinessToken,
 }
 
+/// The subscription of a topic.
+struct Subscription {
+    name: String,
+    type_name: &'static str,
+    _subscriber: Subscriber<()>,
+    _token: LivelinessToken,
+}
+
 /// The server of a service.
 struct Server {
     name: String,
@@ -120,6 +129,7 @@ struct Server {
 pub struct RosNode {
     name: RosNodeName,
     publishers: BTreeMap<String, Publisher>,
+    subscriptions: Vec<Subscription>,
     servers: Vec<Server>,
     /// Number of topics and services that have had a token.
     endpoints: u32,
@@ -140,32 +150,22 @@ impl fmt::Debug for RosNode {
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 impl RosNode {
-    /// Joins the network as a job says, with its services and no topics yet.
+    /// Joins the network as the job of a run says, with its services and no topics yet.
     ///
     /// # Errors
     /// When an endpoint cannot be bound, or no router answers.
     pub fn join(job: &Ros2Job) -> Result<Self, WireSetupError> {
-        let session = open_ros2_session(&job.listen, &job.connect, CONNECT_TIMEOUT)?;
-        let name = RosNodeName {
+        let network = RosNetwork {
             domain: job.domain,
             namespace: job.namespace.clone(),
-            name: NODE_NAME.into(),
             distribution: job.distribution,
-            session: session.zid().to_string(),
+            listen: job.listen.clone(),
+            connect: job.connect.clone(),
         };
-        let token = declare_token(&session, name.node_token())?;
+        let mut node = Self::open(&network, NODE_NAME)?;
         // The sender is kept by the services alone.
         let (request_sender, requests) = channel();
-        let mut node = Self {
-            name,
-            publishers: BTreeMap::new(),
-            servers: Vec::new(),
-            endpoints: 0,
-            requests,
-            malformed: Arc::default(),
-            _token: token,
-            session,
-        };
+        node.requests = requests;
         for service in RunService::ALL {
             let server = node.serve(service, request_sender.clone())?;
             node.servers.push(server);
@@ -173,13 +173,91 @@ impl RosNode {
         Ok(node)
     }
 
+    /// Joins a network as a node with a name and no topics or services yet.
+    ///
+    /// # Errors
+    /// When an endpoint cannot be bound, or no router answers.
+    pub fn open(network: &RosNetwork, name: &str) -> Result<Self, WireSetupError> {
+        let session = open_ros2_session(&network.listen, &network.connect, CONNECT_TIMEOUT)?;
+        let name = RosNodeName {
+            domain: network.domain,
+            namespace: network.namespace.clone(),
+            name: name.into(),
+            distribution: network.distribution,
+            session: session.zid().to_string(),
+        };
+        let token = declare_token(&session, name.node_token())?;
+        // Nothing asks before there is a service.
+        let (_, requests) = channel();
+        Ok(Self {
+            name,
+            publishers: BTreeMap::new(),
+            subscriptions: Vec::new(),
+            servers: Vec::new(),
+            endpoints: 0,
+            requests,
+            malformed: Arc::default(),
+            _token: token,
+            session,
+        })
+    }
+
+    /// Returns the full name of a topic: one without a slash at its beginning is of the namespace of the node.
+    pub fn resolve(&self, topic: &str) -> String {
+        self.name.resolve(topic)
+    }
+
+    /// Listens to a topic by its full name, and calls `on_message` with the bytes of each message. A latched topic brings
+    /// the messages before this, too.
+    ///
+    /// # Errors
+    /// When the session is closed, or the type is not one of [`super::types`].
+    pub fn subscribe(
+        &mut self,
+        topic: &str,
+        type_name: &str,
+        quality: QualityOfService,
+        on_message: impl Fn(&[u8]) + Send + Sync + Clone + 'static,
+    ) -> Result<(), WireSetupError> {
+        let ros_type = known_type(type_name)?;
+        let kind = EndpointKind::Subscription;
+        let endpoint = RosEndpoint { kind, name: topic.into(), ros_type, quality };
+        let key = self.name.data_key(&endpoint);
+        let on_sample = on_message.clone();
+        let declared = self.session.declare_subscriber(key.clone()).callback(move |sample| {
+            on_sample(&sample.payload().to_bytes());
+        });
+        let subscriber = declared.wait().map_err(|error| closed_session(&*error))?;
+        let token = self.next_token(&endpoint);
+        let token = declare_token(&self.session, token)?;
+        self.subscriptions.push(Subscription {
+            name: topic.into(),
+            type_name: ros_type.name,
+            _subscriber: subscriber,
+            _token: token,
+        });
+        if !quality.is_latched {
+            return Ok(());
+        }
+        let history = self.session.get(format!("{key}/@adv/pub/**"));
+        let history = history.accept_replies(ReplyKeyExpr::Any).callback(move |reply| {
+            if let Ok(sample) = reply.result() {
+                on_message(&sample.payload().to_bytes());
+            }
+        });
+        history.wait().map_err(|error| closed_session(&*error))
+    }
+
     /// Returns what the node shows by now.
     pub fn graph(&self) -> RosGraph {
-        let topics = self.publishers.iter();
+        let published = self.publishers.iter();
+        let published = published.map(|(name, topic)| (name.clone(), topic.type_name.into()));
+        let heard = self.subscriptions.iter();
+        let heard = heard.map(|topic| (topic.name.clone(), topic.type_name.into()));
         let services = self.servers.iter();
         RosGraph {
             node: self.name.full_name(),
-            topics: topics.map(|(name, topic)| (name.clone(), topic.type_name.into())).collect(),
+            topics: published.chain(heard).collect(),
             services: services.map(|server| (server.name.clone(), TRIGGER.name.into())).collect(),
         }
     }
@@ -190,11 +268,19 @@ impl RosNode {
     /// When the session is closed, or the type is not one of [`super::types`].
     pub fn publish(&mut self, message: &RosMessage) -> Result<(), WireSetupError> {
         let topic = self.topic_name(&message.topic);
-        if !self.publishers.contains_key(&topic) {
-            let publisher = self.declare_publisher(&topic, message)?;
-            self.publishers.insert(topic.clone(), publisher);
+        self.publish_as(&topic, message)
+    }
+
+    /// Sends a message to a topic by its full name.
+    ///
+    /// # Errors
+    /// Those of [`Self::publish`].
+    pub fn publish_as(&mut self, topic: &str, message: &RosMessage) -> Result<(), WireSetupError> {
+        if !self.publishers.contains_key(topic) {
+            let publisher = self.declare_publisher(topic, message)?;
+            self.publishers.insert(topic.into(), publisher);
         }
-        let Some(publisher) = self.publishers.get_mut(&topic) else { return Ok(()) };
+        let Some(publisher) = self.publishers.get_mut(topic) else { return Ok(()) };
         publisher.sent += 1;
         let attachment = Attachment {
             sequence_number: publisher.sent,
@@ -224,8 +310,9 @@ impl RosNode {
 
     /// Leaves the network: the others see that the node and all that it had is gone.
     pub fn leave(self) {
-        let Self { publishers, servers, session, .. } = self;
+        let Self { publishers, subscriptions, servers, session, .. } = self;
         drop(publishers);
+        drop(subscriptions);
         drop(servers);
         // An error means that it is closed already.
         let _ = session.close().wait();

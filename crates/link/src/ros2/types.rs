@@ -7,11 +7,19 @@
 
 use super::rmw::RosType;
 
-/// The types of the messages of runs, by name.
-pub const MESSAGE_TYPES: [RosType; 9] = [
+/// The types of the messages of runs and of robots that are driven, by name.
+pub const MESSAGE_TYPES: [RosType; 11] = [
     RosType {
         name: "geometry_msgs/msg/PoseStamped",
         hash: "RIHS01_10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
+    },
+    RosType {
+        name: "geometry_msgs/msg/Twist",
+        hash: "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+    },
+    RosType {
+        name: "geometry_msgs/msg/TwistStamped",
+        hash: "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
     },
     RosType {
         name: "nav_msgs/msg/OccupancyGrid",

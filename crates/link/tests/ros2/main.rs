@@ -165,7 +165,10 @@ fn those_who_join_late_get_the_map_and_the_frames_that_stay() {
     let floor = started(ROBOT).scenery().floor.expect("a floor");
     let map = &seen["map"][0];
     let info = &map["info"];
-    assert_eq!([&info["width"], &info["height"]], [&json!(floor.width + 2), &json!(floor.height + 2)]);
+    assert_eq!(
+        [&info["width"], &info["height"]],
+        [&json!(floor.width + 2), &json!(floor.height + 2)]
+    );
     assert!(is_close(&info["resolution"], floor.box_m));
     assert!(is_close(&info["origin"]["position"]["x"], floor.plane.origin_m[0] - floor.box_m));
     let cells = map["data"].as_array().expect("cells");
@@ -325,7 +328,8 @@ fn no_router_is_an_error_that_says_how_to_start_one() {
         ..job
     });
     assert!(failed.remedy.contains("rmw_zenohd"), "{failed:?}");
-    let outside = process::fail(ROBOT, |job| Ros2Job { listen: vec!["tcp/0.0.0.0:0".into()], ..job });
+    let outside =
+        process::fail(ROBOT, |job| Ros2Job { listen: vec!["tcp/0.0.0.0:0".into()], ..job });
     assert!(outside.is_input && outside.remedy.contains("--insecure"), "{outside:?}");
 }
 
