@@ -61,6 +61,9 @@ const REACTION_S: f64 = 0.15;
 /// Echoes within this share of the radius are of the robot itself.
 const OWN_SHARE: f64 = 0.7;
 
+/// What is off the line by more than this share of the radius is passed: noise of ranges must not stop a robot beside a wall.
+const LANE_SHARE: f64 = 0.9;
+
 /// A guard beside the program of a robot.
 #[derive(Debug, Clone)]
 pub struct Guard {
@@ -152,7 +155,7 @@ impl Guard {
         for index in 0..scan.ranges_m.len() {
             let Some(Echo::At([x_m, y_m])) = scan.echo(index) else { continue };
             let ahead_m = x_m * direction;
-            let is_in_way = ahead_m > 0.0 && y_m.abs() < radius_m;
+            let is_in_way = ahead_m > 0.0 && y_m.abs() < LANE_SHARE * radius_m;
             if is_in_way && hypot(x_m, y_m) > OWN_SHARE * radius_m {
                 gap_m = gap_m.min(ahead_m - (radius_m * radius_m - y_m * y_m).sqrt());
             }
