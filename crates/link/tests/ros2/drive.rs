@@ -37,8 +37,9 @@ fn scenario(robots: &[([u32; 3], [u32; 2])]) -> String {
         HALL.join("\n")
     );
     for ([column, row, degrees], [to_column, to_row]) in robots {
+        let heading = degrees / 90;
         text += &format!(
-            "[[robots]]\nat = [[{column}, {row}, {degrees}]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
+            "[[robots]]\nat = [[{column}, {row}, {heading}]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
              behaviour = {{ kind = \"goto\", goals = [[{to_column}, {to_row}]], avoidance = \"plan\" }}\n"
         );
     }
@@ -231,8 +232,12 @@ fn four_robots_arrive_among_each_other_touch_nothing_and_leave_tables_of_their_m
     if !has_peer() {
         return;
     }
-    let robots =
-        [([0, 0, 0], [10, 6]), ([11, 7, 180], [1, 1]), ([0, 7, 270], [10, 1]), ([11, 0, 90], [1, 6])];
+    let robots = [
+        ([0, 0, 0], [10, 6]),
+        ([11, 7, 180], [1, 1]),
+        ([0, 7, 270], [10, 1]),
+        ([11, 0, 90], [1, 6]),
+    ];
     let folder = ScenarioFolder::new(&scenario(&robots));
     let starts = robots.map(|(start, _)| start);
     let mut plants = Plants::start(&starts, &[]);
@@ -306,7 +311,8 @@ fn a_thing_that_the_map_does_not_have_is_a_contact_and_is_not_touched() {
     }
     // A corridor that the thing closes but for the way around.
     let text = scenario(&[([0, 0, 0], [11, 0])]);
-    let folder = ScenarioFolder::new(&text.replace("avoidance = \"plan\"", "avoidance = \"touch\""));
+    let folder =
+        ScenarioFolder::new(&text.replace("avoidance = \"plan\"", "avoidance = \"touch\""));
     let mut plants = Plants::start(&[[0, 0, 0]], &[[4, 0]]);
     let drive = DriveProcess::start(job(&folder.path("s.toml"), 0, plants.port));
     let end = drive.end();

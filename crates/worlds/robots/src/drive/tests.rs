@@ -157,7 +157,7 @@ fn a_percept_by_an_exact_scan_is_that_of_the_simulator() {
 
 #[test]
 fn boxes_and_heading_stay_while_noise_is_less_than_its_margin() {
-    let world = world(&scenario("[[robots]]\nat = [[3, 8, 90]]\n"));
+    let world = world(&scenario("[[robots]]\nat = [[3, 8, 1]]\n"));
     let grid = BodyGrid::new(&world, 0).expect("a robot");
     let at = GridPose { col: 3, row: 8, heading: 1 };
     let center = grid.center(at);
@@ -348,7 +348,7 @@ impl Floor {
 #[test]
 fn a_robot_with_wheels_that_slip_and_noise_arrives_box_by_box_and_touches_nothing() {
     let mut floor = Floor::new(&scenario(
-        "[[robots]]\nat = [[0, 0, 90]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
+        "[[robots]]\nat = [[0, 0, 1]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
          behaviour = { kind = \"goto\", goals = [[18, 8], [1, 1]], repeat = true }\n",
     ));
     let mut steps = 0;
@@ -369,7 +369,7 @@ fn a_robot_with_wheels_that_slip_and_noise_arrives_box_by_box_and_touches_nothin
 #[test]
 fn robots_that_wander_among_each_other_never_touch() {
     let mut floor = Floor::new(&scenario(
-        "[[robots]]\nat = [[0, 0, 90], [4, 1, 0], [8, 8, 180], [10, 0, 270], [18, 9, 180]]\n\
+        "[[robots]]\nat = [[0, 0, 1], [4, 1, 0], [8, 8, 2], [10, 0, 3], [18, 9, 2]]\n\
          sensors = [\"sonar-8\"]\neffector = \"nomad\"\nbehaviour = { kind = \"wander\", turn_every = 6 }\n",
     ));
     floor.advance(4000);
@@ -419,7 +419,7 @@ fn a_contact_is_found_by_scan_bumper_or_stall_and_the_robot_goes_back() {
 #[test]
 fn a_wall_of_the_map_is_a_contact_without_a_motion() {
     let mut floor = Floor::new(&scenario(
-        "[[robots]]\nat = [[0, 0, 180]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
+        "[[robots]]\nat = [[0, 0, 2]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
          behaviour = { kind = \"replay\", actions = [\"forward\"] }\n",
     ));
     let driven = first_action(&mut floor);
@@ -429,7 +429,7 @@ fn a_wall_of_the_map_is_a_contact_without_a_motion() {
 
 #[test]
 fn the_guard_stops_without_fresh_measurements_and_off_the_map_and_bounds_speeds() {
-    let world = world(&scenario("[[robots]]\nat = [[3, 8, 90]]\n"));
+    let world = world(&scenario("[[robots]]\nat = [[3, 8, 1]]\n"));
     let mut guard = Guard::new(GUARD, BodyGrid::new(&world, 0).expect("a robot"));
     let free = scan_by(|_| f64::INFINITY);
     let pose = Pose2 { at_m: [1.75, 4.25], yaw_rad: 0.0 };
@@ -461,19 +461,19 @@ fn robots_that_are_not_alone_or_go_sideways_are_refused() {
         assert!(!remedy.is_empty());
         cause
     };
-    let one = "[[robots]]\nat = [[3, 8, 90]]\n";
+    let one = "[[robots]]\nat = [[3, 8, 1]]\n";
     assert!(refused(&scenario(one), 7).contains("no robot 7"));
-    let talking = scenario("[radio]\nrange_m = 2\n[[robots]]\nat = [[3, 8, 90]]\n");
+    let talking = scenario("[radio]\nrange_m = 2\n[[robots]]\nat = [[3, 8, 1]]\n");
     assert!(refused(&talking, 0).contains("radio"));
     let led = scenario(
-        "[[robots]]\nat = [[3, 8, 90]]\nbehaviour = { kind = \"goto\", goals = [[0, 0]] }\n\
+        "[[robots]]\nat = [[3, 8, 1]]\nbehaviour = { kind = \"goto\", goals = [[0, 0]] }\n\
          planner = { method = \"pibt\" }\n",
     );
     assert!(refused(&led, 0).contains("planner"));
     let sideways = scenario(
         "[effectors.crab]\nforward = [{ p = 1.0, path = \"F\" }]\nleft = [{ p = 1.0, turn = 90 }]\n\
          right = [{ p = 1.0, turn = -90 }]\nslide = [{ p = 1.0, path = \"L\" }]\n\
-         [[robots]]\nat = [[3, 8, 90]]\neffector = \"crab\"\n",
+         [[robots]]\nat = [[3, 8, 1]]\neffector = \"crab\"\n",
     );
     assert!(refused(&sideways, 0).contains("sideways"));
 }
