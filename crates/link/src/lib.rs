@@ -20,6 +20,8 @@
 //! node/              the node of an agent
 //! ros2/              a run as a node of ROS 2, without ROS
 //! vda5050/           vehicles of a warehouse that carry out a plan (its broker.rs opens a socket, too)
+//! plant/             a real robot as its program sees it: measurements in, velocities out; by ROS 2
+//! drive/             the program of a robot that drives a plant
 //! program/           the process: its job, logs, metrics and child processes
 //! ```
 
@@ -28,12 +30,14 @@ mod airspace;
 mod arq;
 mod chain;
 pub mod distributed;
+pub mod drive;
 mod faults;
 pub mod hosted_run;
 pub mod identity;
 pub mod messenger;
 pub mod node;
 pub mod peer;
+pub mod plant;
 pub mod program;
 pub mod protocol;
 mod recent_senders;

@@ -53,6 +53,8 @@ pub enum Job {
     Ros2(Ros2Job),
     /// Let vehicles of a warehouse carry out the plan of a scenario.
     Dispatch(DispatchJob),
+    /// Drive a real robot by ROS 2.
+    Drive(Box<DriveJob>),
 }
 
 /// The name of an agent, in the form used by people: `airplane 3`, or `connector 0.3` for part 3 of body 0.
@@ -206,6 +208,109 @@ pub struct Ros2Job {
     pub replace: bool,
 }
 
+/// A network of ROS 2, and the place of a node in it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RosNetwork {
+    /// The domain, by which ROS 2 separates systems on one network.
+    pub domain: u32,
+    /// The namespace of the node: `/`, or names with a slash before each.
+    pub namespace: String,
+    /// The distribution of ROS 2 of the others.
+    pub distribution: RosDistribution,
+    /// Endpoints at which the others connect; none if this node only connects.
+    pub listen: Vec<String>,
+    /// Endpoints of routers to which this node connects.
+    pub connect: Vec<String>,
+}
+
+/// Job of the program of a real robot, which a node of ROS 2 measures and moves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DriveJob {
+    /// The settings of all jobs; its scenario has the robot and its map.
+    pub common: CommonSettings,
+    /// The robot of the scenario that the real one stands for.
+    pub robot: EntityId,
+    /// The network on which the real robot is.
+    pub network: RosNetwork,
+    /// The topics and the frames of the real robot.
+    pub topics: DriveTopics,
+    /// How it drives.
+    pub settings: DriveSettings,
+    /// Number of trips after which it ends; none to end after the cycles of the scenario.
+    pub trips: Option<u64>,
+    /// File for the table of its motions.
+    pub out: Option<PathBuf>,
+    /// Whether an earlier file there is replaced.
+    pub replace: bool,
+}
+
+/// Topics and frames of a real robot. Names of topics without a slash at their beginning are of the namespace.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DriveTopics {
+    /// Odometry, `nav_msgs/msg/Odometry`.
+    pub odom: String,
+    /// The scanner, `sensor_msgs/msg/LaserScan`.
+    pub scan: String,
+    /// The bumper, `std_msgs/msg/Bool`.
+    pub bumper: String,
+    /// Where commands go, `geometry_msgs/msg/Twist`.
+    pub cmd_vel: String,
+    /// Whether commands have a time: `geometry_msgs/msg/TwistStamped`.
+    pub is_stamped: bool,
+    /// The frame of the map.
+    pub map_frame: String,
+    /// The frame of the robot, if its pose is that frame's in `/tf` and not that of odometry.
+    pub base_frame: Option<String>,
+}
+
+/// How a real robot drives, and the limits of its guard.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DriveSettings {
+    /// Largest speed in m/s.
+    pub speed_mps: f64,
+    /// Largest rate of turning in rad/s.
+    pub turn_radps: f64,
+    /// Largest acceleration in m/s2, with which the robot must be able to brake.
+    pub acceleration_mps2: f64,
+    /// Radius of the robot in meters; none for 0.4 of its side in the scenario.
+    pub radius_m: Option<f64>,
+    /// Distance in meters that it keeps from what its scanner sees before it.
+    pub clearance_m: f64,
+    /// Time in seconds of an action that waits.
+    pub cycle_s: f64,
+    /// Age in seconds of its measurements from which on it stands.
+    pub patience_s: f64,
+    /// Time in seconds of an action after which it ends where it is.
+    pub timeout_s: f64,
+}
+
+/// The state of a drive, after each action and when the guard steps in or lets go.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct DriveStatus {
+    /// Actions that are over.
+    pub actions: u64,
+    /// Those that a contact ended.
+    pub contacts: u64,
+    /// Those that took too long.
+    pub timeouts: u64,
+    /// Trips that are complete.
+    pub trips: u64,
+    /// Column and row of the lower-left box after the last action.
+    pub at: Option<(u32, u32)>,
+    /// Why the guard makes the robot stand or slow down, if it does.
+    pub guarded_by: Option<String>,
+    /// Times that the guard stopped the robot because measurements were too old.
+    pub old_states: u64,
+    /// Times that it stopped the robot because that was off the free boxes of the map.
+    pub off_map: u64,
+    /// Times that it slowed or stopped the robot because something was near.
+    pub obstacles: u64,
+    /// Messages that could not be read, and so were dropped.
+    pub unreadable: u64,
+    /// Messages that were older than the one before, and so were dropped.
+    pub outdated: u64,
+}
+
 /// Distributions of ROS 2 that differ in what they send.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -319,6 +424,10 @@ pub enum LinkMessage {
     Listens(Vec<String>),
     /// The node of ROS 2 is there, with its first messages.
     Ros2(RosGraph),
+    /// The present state of a robot that is driven.
+    Drives(DriveStatus),
+    /// A robot was driven, to its end or until it was stopped.
+    Driven(DriveStatus),
     /// The present state of the fleet.
     Fleet(FleetStatus),
     /// The scenery for watchers: everything that stays the same.

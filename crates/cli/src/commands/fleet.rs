@@ -160,7 +160,9 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
         | LinkMessage::Scene(_)
         | LinkMessage::Seen(_)
         | LinkMessage::Ros2(_)
-        | LinkMessage::Dispatch(_) => {}
+        | LinkMessage::Dispatch(_)
+        | LinkMessage::Drives(_)
+        | LinkMessage::Driven(_) => {}
     });
     table.clear();
     if let Some(end) = end {

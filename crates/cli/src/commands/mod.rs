@@ -6,6 +6,7 @@ mod check;
 mod compare;
 mod completions;
 mod dispatch;
+mod drive;
 mod exact;
 mod export;
 mod finish;
@@ -37,7 +38,7 @@ use clap::Subcommand;
 pub(crate) const GROUPS: &[(&str, &[&str])] = &[
     ("Prepare", &["new", "check", "schema", "inspect", "map", "learn"]),
     ("Run and look at it", &["run", "studio", "resume", "replay", "verify", "report", "export"]),
-    ("Fly on a network", &["fleet", "node", "dispatch"]),
+    ("Fly on a network", &["fleet", "node", "drive", "dispatch"]),
     ("Study", &["sweep", "compare", "exact", "reproduce"]),
     ("Robot arms", &["fk", "ik"]),
     ("This command", &["completions", "man"]),
@@ -56,6 +57,8 @@ pub(crate) enum Command {
     Node(Box<node::NodeArgs>),
     /// Let vehicles of a warehouse carry out a plan, by VDA 5050
     Dispatch(Box<dispatch::DispatchArgs>),
+    /// Drive a real robot of ROS 2 by the program of a robot of a scenario
+    Drive(Box<drive::DriveArgs>),
     /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),
     /// Create a commented scenario as a starting point
@@ -107,6 +110,7 @@ pub(crate) fn execute(command: Command, console: &Console) -> Result<ExitCode, F
         Command::Fleet(args) => fleet::fleet(&args, *console),
         Command::Node(args) => node::node(&args, *console),
         Command::Dispatch(args) => dispatch::dispatch(&args, *console),
+        Command::Drive(args) => drive::drive(&args, *console),
         Command::Check(args) => check::check(&args, *console),
         Command::New(args) => new::new(&args, *console),
         Command::Schema(args) => schema::schema(&args, *console),

@@ -16,22 +16,31 @@ use sidestep_session::fleet::{
 use std::path::PathBuf;
 
 /// The endpoint at which nodes of ROS 2 look for a router on their machine.
-const ROUTER_ENDPOINT: &str = "tcp/127.0.0.1:7447";
+pub(super) const ROUTER_ENDPOINT: &str = "tcp/127.0.0.1:7447";
 
 /// Time in seconds after which a silent party counts as gone: fleets have an option for it, and nodes of ROS 2 have no
 /// lease.
-const LEASE_S: f64 = 10.0;
+pub(super) const LEASE_S: f64 = 10.0;
 
 /// Largest number of a domain in ROS 2.
-const MAX_DOMAIN: i64 = 232;
+pub(super) const MAX_DOMAIN: i64 = 232;
 
 /// Distributions of ROS 2, by their names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum DistributionArg {
+pub(super) enum DistributionArg {
     /// Types without hashes
     Humble,
     /// Types with hashes, as in Kilted and all others since Iron
     Jazzy,
+}
+
+impl DistributionArg {
+    pub(super) fn distribution(self) -> RosDistribution {
+        match self {
+            Self::Humble => RosDistribution::Humble,
+            Self::Jazzy => RosDistribution::Jazzy,
+        }
+    }
 }
 
 /// Options of a run as a node of ROS 2.
@@ -80,7 +89,7 @@ pub(crate) struct Ros2Args {
 }
 
 /// Parses a namespace; the slash at its beginning may be left out.
-fn parse_namespace(text: &str) -> Result<String, String> {
+pub(super) fn parse_namespace(text: &str) -> Result<String, String> {
     let namespace = if text.starts_with('/') { text.to_string() } else { format!("/{text}") };
     let is_name = |name: &str| {
         let is_allowed = |c: char| c.is_ascii_alphanumeric() || c == '_';
@@ -129,10 +138,7 @@ impl Ros2Args {
             },
             domain: self.domain,
             namespace: self.namespace.clone(),
-            distribution: match self.distro {
-                DistributionArg::Humble => RosDistribution::Humble,
-                DistributionArg::Jazzy => RosDistribution::Jazzy,
-            },
+            distribution: self.distro.distribution(),
             listen: if is_default { default_endpoint } else { self.listen.clone() },
             connect: self.connect.clone(),
             speed: self.speed,
@@ -163,8 +169,10 @@ pub(crate) fn run_as_node(
         }
         LinkMessage::Ros2(graph) => print_graph(args, &graph, console),
         LinkMessage::Ended { summary, outcome, .. } => end = Some((summary, outcome)),
-        // `run_job` returns the failure; the others are of fleets.
+        // `run_job` returns the failure; the others are of fleets and drives.
         LinkMessage::Failed(_)
+        | LinkMessage::Drives(_)
+        | LinkMessage::Driven(_)
         | LinkMessage::Fleet(_)
         | LinkMessage::Scene(_)
         | LinkMessage::Seen(_)

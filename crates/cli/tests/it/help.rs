@@ -7,7 +7,7 @@ fn every_command_has_help_with_examples() {
     let place = TestFolder::new();
     for command in [
         "run", "check", "new", "map", "learn", "exact", "fk", "ik", "resume", "replay", "export",
-        "sweep", "report", "fleet", "node", "dispatch",
+        "sweep", "report", "fleet", "node", "drive", "dispatch",
     ] {
         let help = place.run(&[command, "--help"]);
         assert_eq!(help.code(), 0);
@@ -29,7 +29,7 @@ fn wide(text: &str) -> Option<&str> {
 fn no_line_of_help_is_wider_than_80_columns_where_there_is_no_terminal() {
     let place = TestFolder::new();
     let all = "run check new map learn exact fk ik resume replay export sweep compare report schema \
-               completions man reproduce studio fleet node dispatch";
+               completions man reproduce studio fleet node drive dispatch";
     for command in all.split_whitespace() {
         let help = place.run(&[command, "--help"]).out();
         assert_eq!(wide(&help), None, "{command}");

@@ -29,6 +29,8 @@ named! {
     Clock "rosgraph_msgs/msg/Clock" "definitions/Clock.msg"
     Bool "std_msgs/msg/Bool" "definitions/Bool.msg"
     OccupancyGrid "nav_msgs/msg/OccupancyGrid" "definitions/OccupancyGrid.msg"
+    Twist "geometry_msgs/msg/Twist" "definitions/Twist.msg"
+    TwistStamped "geometry_msgs/msg/TwistStamped" "definitions/TwistStamped.msg"
     MarkerArray "visualization_msgs/msg/MarkerArray" "definitions/MarkerArray.msg"
 }
 
@@ -88,6 +90,26 @@ message!(
         pose: Pose,
         /// Covariance of x, y, z and the turns about them, row by row.
         covariance: [f64; 36],
+    }
+);
+
+message!(
+    /// `geometry_msgs/msg/Twist`: a velocity that a robot is to have.
+    Twist {
+        /// The velocity along x, y, z in m/s.
+        linear_mps: [f64; 3],
+        /// The rates of turning about x, y, z in rad/s.
+        angular_radps: [f64; 3],
+    }
+);
+
+message!(
+    /// `geometry_msgs/msg/TwistStamped`: a velocity at a time.
+    TwistStamped {
+        /// The time, and the frame of the velocity.
+        header: Header,
+        /// The velocity.
+        twist: Twist,
     }
 );
 

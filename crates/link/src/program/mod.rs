@@ -6,6 +6,7 @@
 //! dispatch.rs        the master control of vehicles (VDA 5050)
 //! watch.rs           a viewer of a fleet; view.rs: the views at the server
 //! ros2.rs            a run as a node of ROS 2
+//! drive.rs           a real robot that is driven by ROS 2
 //! scenario.rs        the scenario that server and nodes read
 //! certificates.rs    checks of certificates; denials.rs: what they do not allow, for the log
 //! one_thread.rs      the one thread of the network that encrypted links need
@@ -19,6 +20,7 @@ mod certificates;
 mod children;
 mod denials;
 mod dispatch;
+mod drive;
 mod fleet;
 mod log;
 mod metrics;
@@ -44,8 +46,8 @@ use std::process::ExitCode;
 
 /// Usage, for a user who starts the program by hand.
 const USAGE: &str = "\
-sidestep-link runs the server and the nodes of a fleet, and shows runs to ROS 2. `sidestep fleet`, `sidestep node` and
-`sidestep run --ros2` start it and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
+sidestep-link runs the server and the nodes of a fleet, shows runs to ROS 2, and drives robots. `sidestep fleet`,
+`sidestep node`, `sidestep run --ros2` and `sidestep drive` start it and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
 
 /// Does the job that standard input asks for. Exit codes are those of `sidestep`.
 pub fn main() -> ExitCode {
@@ -128,6 +130,11 @@ fn run_job(job: Job) -> Result<(), Error> {
             log::start(job.json_log, &job.log, false)?;
             check_build(&job.planned.build)?;
             dispatch::run(&job, &ParentMonitor::watch())
+        }
+        Job::Drive(job) => {
+            let network = &job.network;
+            apply_common_settings(&job.common, network.connect.iter().chain(&network.listen))?;
+            drive::run(&job, &ParentMonitor::watch())
         }
     }
 }

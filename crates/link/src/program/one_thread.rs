@@ -26,6 +26,7 @@ fn certificates(job: &Job) -> Option<&Tls> {
         Job::Ros2(job) => job.common.tls.as_ref(),
         // Its link to the broker is none of Zenoh.
         Job::Dispatch(_) => None,
+        Job::Drive(job) => job.common.tls.as_ref(),
     }
 }
 

@@ -61,7 +61,7 @@ fn run_error(error: RosRunError) -> Error {
 }
 
 /// Returns endpoints with a free port in the place of each 0.
-fn with_ports(listen: &[String]) -> Result<Vec<String>, Error> {
+pub(super) fn with_ports(listen: &[String]) -> Result<Vec<String>, Error> {
     let mut endpoints = Vec::new();
     // All ports are reserved at once, so that they differ; the node binds them right afterwards.
     let mut reserved = Vec::new();
@@ -73,7 +73,7 @@ fn with_ports(listen: &[String]) -> Result<Vec<String>, Error> {
     Ok(endpoints)
 }
 
-fn network_error(error: WireSetupError) -> Error {
+pub(super) fn network_error(error: WireSetupError) -> Error {
     let cause = error.to_string();
     match error {
         WireSetupError::NoEndpoint { endpoint, .. } => {

@@ -4,14 +4,14 @@ use super::rmw::{
     Attachment, EndpointKind, Gid, QualityOfService, RosEndpoint, RosNodeName, RosType,
     gid_of_token,
 };
-use super::types::{TRIGGER, TWIST, message_type};
+use super::types::{TRIGGER, TWIST_NAME, message_type};
 use super::velocity::Velocity;
 use crate::wire::endpoint::{WireSetupError, without_sources};
 use crate::wire::zenoh::open_ros2_session;
 use sidestep::import::bag::cdr::encode;
 use sidestep::import::bag::messages::TriggerResponse;
 use sidestep::kernel::EntityId;
-use sidestep_session::fleet::{Ros2Job, RosGraph};
+use sidestep_session::fleet::{Ros2Job, RosGraph, RosNetwork};
 use sidestep_session::ros::RosMessage;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -22,8 +22,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
-use zenoh::query::{Query, Queryable};
-use zenoh::sample::Sample;
+use zenoh::query::{Query, Queryable, ReplyKeyExpr};
 use zenoh::{Session, Wait};
 
 /// The name of the node of a run.
@@ -127,9 +126,10 @@ struct Publisher {
     _token: LivelinessToken,
 }
 
-/// A subscription to velocities of a robot.
+/// The subscription of a topic.
 struct Subscription {
-    topic: String,
+    name: String,
+    type_name: &'static str,
     _subscriber: Subscriber<()>,
     _token: LivelinessToken,
 }
@@ -168,22 +168,42 @@ impl fmt::Debug for RosNode {
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 impl RosNode {
-    /// Joins the network as a job says, with its services and no topics yet.
+    /// Joins the network as the job of a run says, with its services and no topics yet.
     ///
     /// # Errors
     /// When an endpoint cannot be bound, or no router answers.
     pub fn join(job: &Ros2Job) -> Result<Self, WireSetupError> {
-        let session = open_ros2_session(&job.listen, &job.connect, CONNECT_TIMEOUT)?;
-        let name = RosNodeName {
+        let network = RosNetwork {
             domain: job.domain,
             namespace: job.namespace.clone(),
-            name: NODE_NAME.into(),
             distribution: job.distribution,
+            listen: job.listen.clone(),
+            connect: job.connect.clone(),
+        };
+        let mut node = Self::open(&network, NODE_NAME)?;
+        for service in RunService::ALL {
+            let server = node.serve(service)?;
+            node.servers.push(server);
+        }
+        Ok(node)
+    }
+
+    /// Joins a network as a node with a name and no topics or services yet.
+    ///
+    /// # Errors
+    /// When an endpoint cannot be bound, or no router answers.
+    pub fn open(network: &RosNetwork, name: &str) -> Result<Self, WireSetupError> {
+        let session = open_ros2_session(&network.listen, &network.connect, CONNECT_TIMEOUT)?;
+        let name = RosNodeName {
+            domain: network.domain,
+            namespace: network.namespace.clone(),
+            name: name.into(),
+            distribution: network.distribution,
             session: session.zid().to_string(),
         };
         let token = declare_token(&session, name.node_token())?;
         let (input_sender, inputs) = channel();
-        let mut node = Self {
+        Ok(Self {
             name,
             publishers: BTreeMap::new(),
             servers: Vec::new(),
@@ -194,12 +214,53 @@ impl RosNode {
             malformed: Arc::default(),
             _token: token,
             session,
-        };
-        for service in RunService::ALL {
-            let server = node.serve(service)?;
-            node.servers.push(server);
+        })
+    }
+
+    /// Returns the full name of a topic: one without a slash at its beginning is of the namespace of the node.
+    pub fn resolve(&self, topic: &str) -> String {
+        self.name.resolve(topic)
+    }
+
+    /// Listens to a topic by its full name, and calls `on_message` with the bytes of each message. A latched topic brings
+    /// the messages before this, too.
+    ///
+    /// # Errors
+    /// When the session is closed, or the type is not one of [`super::types`].
+    pub fn subscribe(
+        &mut self,
+        topic: &str,
+        type_name: &str,
+        quality: QualityOfService,
+        on_message: impl Fn(&[u8]) + Send + Sync + Clone + 'static,
+    ) -> Result<(), WireSetupError> {
+        let ros_type = known_type(type_name)?;
+        let kind = EndpointKind::Subscription;
+        let endpoint = RosEndpoint { kind, name: topic.into(), ros_type, quality };
+        let key = self.name.data_key(&endpoint);
+        let on_sample = on_message.clone();
+        let declared = self.session.declare_subscriber(key.clone()).callback(move |sample| {
+            on_sample(&sample.payload().to_bytes());
+        });
+        let subscriber = declared.wait().map_err(|error| closed_session(&*error))?;
+        let token = self.next_token(&endpoint);
+        let token = declare_token(&self.session, token)?;
+        self.subscriptions.push(Subscription {
+            name: topic.into(),
+            type_name: ros_type.name,
+            _subscriber: subscriber,
+            _token: token,
+        });
+        if !quality.is_latched {
+            return Ok(());
         }
-        Ok(node)
+        let history = self.session.get(format!("{key}/@adv/pub/**"));
+        let history = history.accept_replies(ReplyKeyExpr::Any).callback(move |reply| {
+            if let Ok(sample) = reply.result() {
+                on_message(&sample.payload().to_bytes());
+            }
+        });
+        history.wait().map_err(|error| closed_session(&*error))
     }
 
     /// Returns what the node shows by now.
@@ -209,7 +270,7 @@ impl RosNode {
             topics.insert(name.clone(), topic.type_name.to_string());
         }
         for subscription in &self.subscriptions {
-            topics.insert(subscription.topic.clone(), TWIST.name.into());
+            topics.insert(subscription.name.clone(), subscription.type_name.to_string());
         }
         let services = self.servers.iter();
         RosGraph {
@@ -225,11 +286,19 @@ impl RosNode {
     /// When the session is closed, or the type is not one of [`super::types`].
     pub fn publish(&mut self, message: &RosMessage) -> Result<(), WireSetupError> {
         let topic = self.topic_name(&message.topic);
-        if !self.publishers.contains_key(&topic) {
-            let publisher = self.declare_publisher(&topic, message)?;
-            self.publishers.insert(topic.clone(), publisher);
+        self.publish_as(&topic, message)
+    }
+
+    /// Sends a message to a topic by its full name.
+    ///
+    /// # Errors
+    /// Those of [`Self::publish`].
+    pub fn publish_as(&mut self, topic: &str, message: &RosMessage) -> Result<(), WireSetupError> {
+        if !self.publishers.contains_key(topic) {
+            let publisher = self.declare_publisher(topic, message)?;
+            self.publishers.insert(topic.into(), publisher);
         }
-        let Some(publisher) = self.publishers.get_mut(&topic) else { return Ok(()) };
+        let Some(publisher) = self.publishers.get_mut(topic) else { return Ok(()) };
         publisher.sent += 1;
         let attachment = Attachment {
             sequence_number: publisher.sent,
@@ -249,29 +318,17 @@ impl RosNode {
     /// # Errors
     /// When the session is closed.
     pub fn hear_velocities(&mut self, robot: EntityId) -> Result<(), WireSetupError> {
-        let topic = self.name.resolve(&format!("robot_{robot}/cmd_vel"));
-        let endpoint = RosEndpoint {
-            kind: EndpointKind::Subscription,
-            name: topic.clone(),
-            ros_type: TWIST,
-            quality: QualityOfService::DEFAULT,
-        };
+        let topic = self.resolve(&format!("robot_{robot}/cmd_vel"));
         let inputs = self.input_sender.clone();
         let malformed = self.malformed.clone();
-        let key = self.name.data_key(&endpoint);
-        let subscriber = self.session.declare_subscriber(key).callback(move |sample: Sample| {
-            let Some(velocity) = Velocity::from_twist(&sample.payload().to_bytes()) else {
+        self.subscribe(&topic, TWIST_NAME, QualityOfService::DEFAULT, move |bytes| {
+            let Some(velocity) = Velocity::from_twist(bytes) else {
                 malformed.fetch_add(1, Ordering::Relaxed);
                 return;
             };
             // An error means that the node has ended.
             let _ = inputs.send(RosInput::Velocity { robot, velocity });
-        });
-        let subscriber = subscriber.wait().map_err(|error| closed_session(&*error))?;
-        let token = self.next_token(&endpoint);
-        let token = declare_token(&self.session, token)?;
-        self.subscriptions.push(Subscription { topic, _subscriber: subscriber, _token: token });
-        Ok(())
+        })
     }
 
     /// Returns what has come in next; waits for it at most the given time.

@@ -7,11 +7,19 @@
 
 use super::rmw::RosType;
 
-/// The types of the messages that runs send, by name.
-pub const MESSAGE_TYPES: [RosType; 9] = [
+/// The types of the messages of runs and of robots that are driven, by name.
+pub const MESSAGE_TYPES: [RosType; 11] = [
     RosType {
         name: "geometry_msgs/msg/PoseStamped",
         hash: "RIHS01_10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
+    },
+    RosType {
+        name: "geometry_msgs/msg/Twist",
+        hash: "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+    },
+    RosType {
+        name: "geometry_msgs/msg/TwistStamped",
+        hash: "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
     },
     RosType {
         name: "nav_msgs/msg/OccupancyGrid",
@@ -53,11 +61,8 @@ pub const TRIGGER: RosType = RosType {
     hash: "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
 };
 
-/// The velocity that a robot is asked for.
-pub const TWIST: RosType = RosType {
-    name: "geometry_msgs/msg/Twist",
-    hash: "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
-};
+/// The type of a velocity that a robot is to have.
+pub const TWIST_NAME: &str = "geometry_msgs/msg/Twist";
 
 /// Returns the type of messages with a name.
 pub fn message_type(name: &str) -> Option<RosType> {

@@ -4,6 +4,7 @@
 //! The interpreter is that of SIDESTEP_PYTHON, else `python3`; where it or a package is not here these tests are skipped,
 //! unless SIDESTEP_REQUIRE names `python`.
 
+mod drive;
 mod process;
 
 use process::{Peer, RosProcess, job};

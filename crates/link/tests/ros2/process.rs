@@ -14,21 +14,26 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 /// Time longer than anything here takes, on a machine that has much else to do.
-const TEST_TIMEOUT: Duration = Duration::from_secs(300);
+pub(crate) const TEST_TIMEOUT: Duration = Duration::from_secs(300);
+
+/// Returns the settings of all jobs for a scenario.
+pub(crate) fn common_settings(file: &Path) -> CommonSettings {
+    let build = WORLDS.build().into();
+    CommonSettings {
+        flown: JobScenario { file: file.into(), overrides: Vec::new(), build },
+        tls: None,
+        is_insecure: false,
+        lease_s: 10.0,
+        metrics: None,
+        json_log: false,
+        log: "warn".into(),
+    }
+}
 
 /// Returns the job of a scenario that listens at any free port of this machine.
 pub(crate) fn job(file: &Path) -> Ros2Job {
-    let build = WORLDS.build().into();
     Ros2Job {
-        common: CommonSettings {
-            flown: JobScenario { file: file.into(), overrides: Vec::new(), build },
-            tls: None,
-            is_insecure: false,
-            lease_s: 10.0,
-            metrics: None,
-            json_log: false,
-            log: "warn".into(),
-        },
+        common: common_settings(file),
         domain: 0,
         namespace: "/".into(),
         distribution: RosDistribution::Jazzy,

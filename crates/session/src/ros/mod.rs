@@ -51,7 +51,8 @@ pub struct RosMessage {
 }
 
 impl RosMessage {
-    fn new<T: Message>(topic: impl Into<String>, time_s: f64, message: &T) -> Self {
+    /// Returns a message of a topic at a time in seconds.
+    pub fn new<T: Message>(topic: impl Into<String>, time_s: f64, message: &T) -> Self {
         Self {
             topic: topic.into(),
             type_name: T::NAME,

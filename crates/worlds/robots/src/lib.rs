@@ -10,6 +10,7 @@
 //! plan.rs: before a cycle, the planners of teams (team.rs)      action_progress.rs, long_action.rs: actions of several cycles
 //! errands.rs: the tasks of teams      run_plan.rs: the plan of a run without errors, for vehicles
 //! agents.rs: a robot's program outside of a run      remote_agents.rs: its percepts, and the controls that a run takes
+//! drive/: a robot outside of the simulator, by its own measurements
 //! action.rs, alias_table.rs: the error models, prepared         metrics.rs: the sums of a run
 //! broadcast.rs: the words of the radio          watch/: who comes nearer to its goal, and gridlocks
 //! ```
@@ -31,6 +32,7 @@ mod cycle_context;
 pub mod decide;
 mod delay;
 mod delayed_turn;
+pub mod drive;
 mod errand_fields;
 mod errands;
 pub mod exact;

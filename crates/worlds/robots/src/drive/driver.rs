@@ -1,0 +1,250 @@
+//! A robot that its program drives: measurements in, velocities out.
+
+use super::DriveVelocity;
+use super::controller::{ActionOutcome, ActionProgress, Controller, DriveLimits, DriveState};
+use super::grid::{BodyGrid, GridLocalizer};
+use super::guard::{Guard, GuardCause, GuardCounts, GuardLimits, GuardView};
+use super::percept::{PerceptBuilder, RobotSituation};
+use super::plan::{ActionPlanner, GridMotion};
+use super::scan::RangeScan;
+use crate::agents::RobotAgent;
+use crate::decide::{ActionId, Contact, TripEvent};
+use crate::world::RobotsWorld;
+use sidestep_kernel::{Cycle, EntityId};
+use sidestep_planners::GridPose;
+use std::sync::Arc;
+
+/// An action that a robot has carried out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrivenAction {
+    /// The number of its decision, from 0.
+    pub cycle: Cycle,
+    /// Its number in the effector.
+    pub action: ActionId,
+    /// Where the robot stood after it; none off the map.
+    pub end: GridPose,
+    /// What it came to, in boxes and quarter turns.
+    pub motion: GridMotion,
+    /// What stopped it.
+    pub contact: Option<Contact>,
+    /// Whether it took too long.
+    pub is_timed_out: bool,
+    /// How long it took, in seconds of the robot's own time.
+    pub duration_s: f64,
+}
+
+/// The state of a drive.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct DriveCounts {
+    /// Actions that are over.
+    pub actions: u64,
+    /// Actions that a contact ended.
+    pub contacts: u64,
+    /// Actions that took too long.
+    pub timeouts: u64,
+    /// Trips that are complete.
+    pub trips: u64,
+    /// How often the guard has stepped in.
+    pub guard: GuardCounts,
+}
+
+/// The program of a robot, and all that it takes to drive by it.
+#[derive(Debug)]
+pub struct Driver {
+    agent: RobotAgent,
+    grid: BodyGrid,
+    localizer: GridLocalizer,
+    percepts: PerceptBuilder,
+    planner: ActionPlanner,
+    limits: DriveLimits,
+    guard: Guard,
+    /// The kind of what stops the robot where the map has nothing.
+    robot_kind: u8,
+    present: Option<PresentAction>,
+    cycle: Cycle,
+    contact: Option<Contact>,
+    memory: [u32; 4],
+    counts: DriveCounts,
+}
+
+#[derive(Debug)]
+struct PresentAction {
+    action: ActionId,
+    controller: Controller,
+}
+
+/// What a step of a drive has brought.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveStep {
+    /// The velocity that the robot is to have, after the guard.
+    pub velocity: DriveVelocity,
+    /// The action that is over.
+    pub ended: Option<DrivenAction>,
+    /// Why the guard steps in, if it does.
+    pub guarded_by: Option<GuardCause>,
+}
+
+impl Driver {
+    /// Returns the driver of a robot.
+    ///
+    /// # Errors
+    /// With the cause and the remedy, when a real robot cannot be driven so.
+    pub fn new(
+        world: &Arc<RobotsWorld>,
+        id: EntityId,
+        limits: DriveLimits,
+        guard: GuardLimits,
+    ) -> Result<Self, (String, String)> {
+        let Some(grid) = BodyGrid::new(world, id) else {
+            let cause = format!("there is no robot {id}");
+            let last = world.robot_count().saturating_sub(1);
+            return Err((cause, format!("give one of 0 to {last}")));
+        };
+        check_is_alone(world, id)?;
+        let no_program = || {
+            let cause = format!("robot {id} follows the orders of a caller, and decides nothing");
+            let remedy =
+                "give its section a behavior of its own, e.g. behaviour = { kind = \"wander\" }";
+            (cause, remedy.to_string())
+        };
+        let agent = RobotAgent::new(world.clone(), id).ok_or_else(no_program)?;
+        let percepts = PerceptBuilder::new(world, id).ok_or_else(no_program)?;
+        let planner = ActionPlanner::new(world, id).map_err(|cause| {
+            let remedy = "a robot with two wheels goes ahead or back and turns; give it such an effector, e.g. nomad";
+            (cause, remedy.to_string())
+        })?;
+        Ok(Self {
+            agent,
+            localizer: GridLocalizer::new(grid.clone()),
+            guard: Guard::new(guard, grid.clone()),
+            grid,
+            percepts,
+            planner,
+            limits,
+            robot_kind: world.type_of(id).kind,
+            present: None,
+            cycle: 0,
+            contact: None,
+            memory: [0; 4],
+            counts: DriveCounts::default(),
+        })
+    }
+
+    /// Returns the percepts' builder, which knows the beams of the scenario.
+    pub fn percepts(&self) -> &PerceptBuilder {
+        &self.percepts
+    }
+
+    /// Returns the number of the next decision.
+    pub fn cycle(&self) -> Cycle {
+        self.cycle
+    }
+
+    /// Returns the counts so far.
+    pub fn counts(&self) -> DriveCounts {
+        DriveCounts { guard: self.guard.counts(), ..self.counts }
+    }
+
+    /// Takes a measurement that is fresh, and the scan before it with its age in seconds.
+    ///
+    /// # Errors
+    /// When the percept is none of this robot, with the reason.
+    pub fn step(
+        &mut self,
+        state: &DriveState,
+        scan: &RangeScan,
+        age_s: f64,
+    ) -> Result<DriveStep, String> {
+        let view = GuardView { pose: Some(&state.pose), scan: Some(scan), age_s };
+        let Some(at) = self.localizer.update(&state.pose) else {
+            // Off the map there is no percept; the action goes on when the robot is back.
+            return Ok(self.guarded(DriveVelocity::ZERO, None, &view));
+        };
+        let mut ended = None;
+        if let Some(present) = &mut self.present {
+            match present.controller.update(state) {
+                ActionProgress::UnderWay(wanted) => return Ok(self.guarded(wanted, None, &view)),
+                ActionProgress::Done(outcome) => ended = self.end_action(outcome, at),
+            }
+        }
+        self.begin_action(state, scan, at)?;
+        Ok(self.guarded(DriveVelocity::ZERO, ended, &view))
+    }
+
+    /// Returns whether measurements of an age in seconds are fresh enough to move by.
+    pub fn is_fresh(&self, age_s: f64) -> bool {
+        self.guard.is_fresh(age_s)
+    }
+
+    /// Takes note that there is no fresh measurement: the robot is to stand.
+    pub fn stop(&mut self, view: &GuardView<'_>) -> DriveStep {
+        self.guarded(DriveVelocity::ZERO, None, view)
+    }
+
+    fn guarded(
+        &mut self,
+        wanted: DriveVelocity,
+        ended: Option<DrivenAction>,
+        view: &GuardView<'_>,
+    ) -> DriveStep {
+        let velocity = self.guard.limit(wanted, view);
+        DriveStep { velocity, ended, guarded_by: self.guard.cause() }
+    }
+
+    fn end_action(&mut self, outcome: ActionOutcome, end: GridPose) -> Option<DrivenAction> {
+        let present = self.present.take()?;
+        self.contact = outcome.contact;
+        self.counts.actions += 1;
+        self.counts.contacts += u64::from(outcome.contact.is_some());
+        self.counts.timeouts += u64::from(outcome.is_timed_out);
+        let driven = DrivenAction {
+            cycle: self.cycle,
+            action: present.action,
+            end,
+            motion: GridMotion::between(present.controller.plan().start, end),
+            contact: outcome.contact,
+            is_timed_out: outcome.is_timed_out,
+            duration_s: present.controller.duration_s(),
+        };
+        self.cycle += 1;
+        Some(driven)
+    }
+
+    fn begin_action(
+        &mut self,
+        state: &DriveState,
+        scan: &RangeScan,
+        at: GridPose,
+    ) -> Result<(), String> {
+        let situation = RobotSituation {
+            cycle: self.cycle,
+            at,
+            pose: state.pose,
+            contact: self.contact,
+            memory: self.memory,
+        };
+        let control = self.agent.decide(&self.percepts.percept(&situation, scan))?;
+        self.memory = control.memory;
+        self.counts.trips += u64::from(control.trip == Some(TripEvent::Completed));
+        let plan = self.planner.plan(control.action, at);
+        let controller = Controller::start(self.limits, &self.grid, plan, state, self.robot_kind);
+        self.present = Some(PresentAction { action: control.action, controller });
+        Ok(())
+    }
+}
+
+/// Refuses robots that act by what others say: nothing brings that to a real robot.
+fn check_is_alone(world: &RobotsWorld, id: EntityId) -> Result<(), (String, String)> {
+    if world.radio.is_some() {
+        let cause =
+            "the robots of the scenario talk by radio, and a robot that is driven hears nobody";
+        let remedy = "remove [radio], and give the robots a behavior that needs none";
+        return Err((cause.into(), remedy.into()));
+    }
+    if world.planner_teams.iter().any(|team| team.robots.contains(&id)) {
+        let cause = format!("robot {id} does what the planner of its team says, and is not alone");
+        let remedy = "remove `planner` from its section, or run it in a fleet: sidestep fleet";
+        return Err((cause, remedy.into()));
+    }
+    Ok(())
+}
