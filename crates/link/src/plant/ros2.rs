@@ -119,7 +119,7 @@ impl Plant for Ros2Plant {
         let inbox = self.shared.lock();
         let waited =
             self.shared.arrived.wait_timeout_while(inbox, within, |inbox| inbox.poses() == seen);
-        let (mut inbox, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let mut inbox = waited.unwrap_or_else(PoisonError::into_inner).0;
         self.seen = inbox.poses();
         let state = inbox.take_state();
         drop(inbox);

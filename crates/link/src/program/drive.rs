@@ -5,11 +5,13 @@ use super::parent_monitor::ParentMonitor;
 use super::ros2::{network_error, with_ports};
 use crate::drive::motion_log::{MotionLog, MotionNames};
 use crate::drive::{Drive, DriveEnd, DriveError};
+use crate::plant::Plant;
 use crate::plant::ros2::Ros2Plant;
 use crate::ros2::node::RosNode;
 use sidestep::kernel::InputError;
 use sidestep::worlds::WORLDS;
 use sidestep::worlds::robots::RobotsWorld;
+use sidestep::worlds::robots::drive::DriveVelocity;
 use sidestep::worlds::robots::drive::controller::DriveLimits;
 use sidestep::worlds::robots::drive::driver::Driver;
 use sidestep::worlds::robots::drive::guard::GuardLimits;
@@ -57,6 +59,8 @@ pub(super) fn run(job: &DriveJob, parent: &ParentMonitor) -> Result<(), Error> {
     // After the network: what is wrong there leaves no file behind.
     let log = motion_log(job, world)?;
     let mut plant = Ros2Plant::start(node, &job.topics).map_err(network_error)?;
+    // So that the topic of commands is known before the first measurement, and a robot that moves stands.
+    plant.command(DriveVelocity::ZERO).map_err(|cause| drive_error(DriveError::Plant(cause)))?;
     print_message(&LinkMessage::Listens(network.listen.clone()));
     print_message(&LinkMessage::Ros2(plant.node().graph()));
     let end = DriveEnd { actions: compiled.plan().cycles, trips: job.trips };

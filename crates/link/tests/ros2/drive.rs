@@ -5,7 +5,7 @@ use crate::process::{TEST_TIMEOUT, common_settings};
 use serde_json::{Value, json};
 use sidestep_session::fleet::{
     DriveJob, DriveSettings, DriveStatus, DriveTopics, Job, JobError, LinkMessage, RosDistribution,
-    RosNetwork, link_command,
+    RosGraph, RosNetwork, link_command,
 };
 use sidestep_testing::{has_modules, python};
 use std::io::{BufRead, BufReader, Write};
@@ -57,15 +57,22 @@ struct Plants {
 
 impl Plants {
     fn start(starts: &[[u32; 3]], walls: &[[u32; 2]]) -> Self {
+        Self::start_with(starts, json!({ "walls": walls }))
+    }
+
+    fn start_with(starts: &[[u32; 3]], more: Value) -> Self {
         // Another process may take the port in between; then the plants say so and the test fails.
         let port = {
             let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
             listener.local_addr().expect("an address").port()
         };
-        let config = json!({
-            "port": port, "domain": DOMAIN, "map": HALL, "box_m": BOX_M, "radius_m": RADIUS_M,
-            "starts": starts, "walls": walls,
-        });
+        let mut config = more;
+        config["port"] = port.into();
+        config["domain"] = DOMAIN.into();
+        config["map"] = json!(HALL);
+        config["box_m"] = BOX_M.into();
+        config["radius_m"] = RADIUS_M.into();
+        config["starts"] = json!(starts);
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/ros2/plant.py");
         let mut command = Command::new(python());
         command.arg(script).arg(config.to_string()).stdin(Stdio::piped()).stdout(Stdio::piped());
@@ -127,6 +134,17 @@ impl DriveProcess {
 
     fn next(&self) -> LinkMessage {
         self.messages.recv_timeout(TEST_TIMEOUT).expect("the drive tells something")
+    }
+
+    /// Waits for the topics that it has.
+    fn graph(&self) -> RosGraph {
+        loop {
+            match self.next() {
+                LinkMessage::Ros2(graph) => return graph,
+                LinkMessage::Listens(_) => {}
+                other => panic!("{other:?}"),
+            }
+        }
     }
 
     /// Waits until a state holds.
@@ -295,8 +313,15 @@ fn a_robot_that_is_interrupted_on_its_way_is_told_to_stand() {
         return;
     }
     let folder = ScenarioFolder::new(&scenario(&[([0, 0, 0], [11, 0])]));
-    let mut plants = Plants::start(&[[0, 0, 0]], &[]);
-    let mut drive = DriveProcess::start(job(&folder.path("s.toml"), 0, plants.port));
+    // Commands with a time, as newer drivers of bases want them.
+    let mut plants = Plants::start_with(&[[0, 0, 0]], json!({ "stamped": true }));
+    let mut job = job(&folder.path("s.toml"), 0, plants.port);
+    job.topics.is_stamped = true;
+    let mut drive = DriveProcess::start(job);
+    let graph = drive.graph();
+    assert_eq!(graph.node, "/robot_0/sidestep_drive_0");
+    let commands = ("/robot_0/cmd_vel".to_string(), "geometry_msgs/msg/TwistStamped".to_string());
+    assert_eq!(graph.topics.first(), Some(&commands), "{graph:?}");
     drive.wait_for(|status| status.actions >= 2);
     let end = drive.interrupt();
     assert_eq!(end.trips, 0);

@@ -5,7 +5,7 @@ and CDR, and a few lines of physics.
 
 CONFIG is a JSON object: `port`, at which the router listens; `domain`; `map`, rows of `.` and `#` from the north; `box_m`;
 `starts`, a column, a row and a heading in degrees for each robot; `radius_m`; `walls`, further squares that the map of the
-robots does not have, by column and row. Wheels slip, lasers and localization are noisy. Lines on standard input:
+robots does not have, by column and row; `stamped`, whether commands are TwistStamped. Wheels slip, lasers and localization are noisy. Lines on standard input:
 
     silence   stop sending measurements; answers when the last command of each robot is zero
     speak     send them again
@@ -87,11 +87,13 @@ class Robot:
         self.odom = topic(ROS2Publisher, f"/{self.name}/odom", "nav_msgs/msg/Odometry")
         self.scan = topic(ROS2Publisher, f"/{self.name}/scan", "sensor_msgs/msg/LaserScan")
         self.bumper = topic(ROS2Publisher, f"/{self.name}/bumper", "std_msgs/msg/Bool")
+        kind = "TwistStamped" if CONFIG.get("stamped") else "Twist"
         self.heard = topic(
-            ROS2Subscriber, f"/{self.name}/cmd_vel", "geometry_msgs/msg/Twist", self.on_command
+            ROS2Subscriber, f"/{self.name}/cmd_vel", f"geometry_msgs/msg/{kind}", self.on_command
         )
 
     def on_command(self, message):
+        message = getattr(message, "twist", message)
         self.velocity = (message.linear.x, message.angular.z)
         self.fastest = [max(a, abs(b)) for a, b in zip(self.fastest, self.velocity, strict=True)]
         self.commands += 1

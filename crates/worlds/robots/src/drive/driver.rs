@@ -21,7 +21,7 @@ pub struct DrivenAction {
     pub cycle: Cycle,
     /// Its number in the effector.
     pub action: ActionId,
-    /// Where the robot stood after it; none off the map.
+    /// Where the robot stood after it.
     pub end: GridPose,
     /// What it came to, in boxes and quarter turns.
     pub motion: GridMotion,

@@ -138,9 +138,9 @@ impl GridMotion {
     pub fn between(start: GridPose, end: GridPose) -> Self {
         let dx = i64::from(end.col) - i64::from(start.col);
         let dy = i64::from(end.row) - i64::from(start.row);
-        let (ux, uy) = HEADINGS[usize::from(start.heading % 4)];
-        let ux = i64::from(ux);
-        let uy = i64::from(uy);
+        let heading = HEADINGS[usize::from(start.heading % 4)];
+        let ux = i64::from(heading.0);
+        let uy = i64::from(heading.1);
         let quarters = (4 + i32::from(end.heading) - i32::from(start.heading)) % 4;
         Self {
             ahead: dx * ux + dy * uy,

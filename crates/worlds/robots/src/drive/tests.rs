@@ -88,11 +88,14 @@ fn wall_squares(world: &RobotsWorld) -> Vec<[f64; 2]> {
     squares
 }
 
-const RAYS: usize = 720;
+/// Rays of an exact scan: one for each beam of the presets.
+const EXACT_RAYS: usize = 720;
+/// Rays of a scan where robots move.
+const RAYS: usize = 120;
 
-fn scan_by(hit_m: impl Fn(f64) -> f64) -> RangeScan {
-    let step_rad = TAU / RAYS as f64;
-    let ranges_m = (0..RAYS).map(|k| hit_m(-PI + k as f64 * step_rad) as f32).collect();
+fn scan_by(rays: usize, hit_m: impl Fn(f64) -> f64) -> RangeScan {
+    let step_rad = TAU / rays as f64;
+    let ranges_m = (0..rays).map(|k| hit_m(-PI + k as f64 * step_rad) as f32).collect();
     RangeScan { first_rad: -PI, step_rad, ranges_m, max_m: 12.0, ..RangeScan::default() }
 }
 
@@ -112,7 +115,7 @@ fn exact_scan(
             squares.push(corner.map(|boxes| f64::from(boxes) * side_m));
         }
     }
-    scan_by(|bearing_rad| {
+    scan_by(EXACT_RAYS, |bearing_rad| {
         let yaw_rad = pose.yaw_rad + bearing_rad;
         let hits = squares.iter().filter_map(|low| square_hit(pose.at_m, yaw_rad, *low, side_m));
         hits.fold(f64::INFINITY, f64::min)
@@ -285,7 +288,7 @@ impl Floor {
     fn scan(&mut self, own: usize) -> RangeScan {
         let pose = self.plants[own].pose;
         let discs = self.discs_but(own);
-        let mut scan = scan_by(|bearing_rad| {
+        let mut scan = scan_by(RAYS, |bearing_rad| {
             let yaw_rad = pose.yaw_rad + bearing_rad;
             let walls = self
                 .squares
@@ -372,11 +375,11 @@ fn robots_that_wander_among_each_other_never_touch() {
         "[[robots]]\nat = [[0, 0, 1], [4, 1, 0], [8, 8, 2], [10, 0, 3], [18, 9, 2]]\n\
          sensors = [\"sonar-8\"]\neffector = \"nomad\"\nbehaviour = { kind = \"wander\", turn_every = 6 }\n",
     ));
-    floor.advance(4000);
-    assert_eq!(floor.touches, 0, "200 seconds");
+    floor.advance(2400);
+    assert_eq!(floor.touches, 0, "two minutes");
     for plant in &floor.plants {
         let moved = plant.ended.iter().filter(|driven| driven.motion.ahead == 1).count();
-        assert!(moved > 20, "{moved} {:?}", plant.driver.counts());
+        assert!(moved > 12, "{moved} {:?}", plant.driver.counts());
     }
 }
 
@@ -412,7 +415,8 @@ fn a_contact_is_found_by_scan_bumper_or_stall_and_the_robot_goes_back() {
         assert_eq!((driven.motion.ahead, driven.motion.turn_deg), (0, 0));
         let at_m = floor.plants[0].pose.at_m;
         assert!(hypot(at_m[0] - 1.25, at_m[1] - 0.25) < 0.08, "{at_m:?}");
-        assert_eq!(floor.touches == 0, !is_blind, "one that sees does not touch");
+        let has_noticed = !is_blind || has_bumpers;
+        assert_eq!(floor.touches == 0, has_noticed, "only one that notices nothing is held up");
     }
 }
 
@@ -431,7 +435,7 @@ fn a_wall_of_the_map_is_a_contact_without_a_motion() {
 fn the_guard_stops_without_fresh_measurements_and_off_the_map_and_bounds_speeds() {
     let world = world(&scenario("[[robots]]\nat = [[3, 8, 1]]\n"));
     let mut guard = Guard::new(GUARD, BodyGrid::new(&world, 0).expect("a robot"));
-    let free = scan_by(|_| f64::INFINITY);
+    let free = scan_by(RAYS, |_| f64::INFINITY);
     let pose = Pose2 { at_m: [1.75, 4.25], yaw_rad: 0.0 };
     let outside = Pose2 { at_m: [-0.1, 4.25], yaw_rad: 0.0 };
     let view = |pose, age_s| GuardView { pose: Some(pose), scan: Some(&free), age_s };
@@ -445,7 +449,8 @@ fn the_guard_stops_without_fresh_measurements_and_off_the_map_and_bounds_speeds(
     assert_eq!(guard.limit(fast, &view(&outside, 0.0)), DriveVelocity::ZERO);
     let no_number = DriveVelocity { forward_mps: f64::NAN, turn_radps: 0.0 };
     assert_eq!(guard.limit(no_number, &view(&pose, 0.0)), DriveVelocity::ZERO);
-    let near = scan_by(|bearing_rad| if bearing_rad.abs() < 0.1 { 0.25 } else { f64::INFINITY });
+    let near =
+        scan_by(RAYS, |bearing_rad| if bearing_rad.abs() < 0.1 { 0.25 } else { f64::INFINITY });
     let view = GuardView { pose: Some(&pose), scan: Some(&near), age_s: 0.0 };
     assert_eq!(guard.limit(fast, &view).forward_mps, 0.0, "5 cm before it, and it needs more");
     assert_eq!(guard.limit(DriveVelocity { forward_mps: -9.0, ..fast }, &view).forward_mps, -0.4);
