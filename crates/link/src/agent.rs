@@ -41,7 +41,7 @@ pub struct AgentActivity {
 }
 
 /// The program of an agent: a state machine without a clock, a socket or a thread, so that the same program runs in the
-/// simulator and at a node.
+/// simulator and at a node. One that decides alone has no packets and no timers.
 pub trait AgentProgram: Send {
     /// Starts a cycle with the agent's percept, and abandons the cycle before. Returns the tick in which the cycle
     /// starts.
@@ -51,16 +51,20 @@ pub trait AgentProgram: Send {
     fn start_cycle(&mut self, cycle: Cycle, percept: &[u8]) -> Result<u64, String>;
 
     /// Receives a packet of another agent.
-    fn on_packet(&mut self, from: EntityId, payload: &[u8], tick: u64);
+    fn on_packet(&mut self, _from: EntityId, _payload: &[u8], _tick: u64) {}
 
     /// Does everything that is due by a tick.
-    fn on_timer(&mut self, tick: u64);
+    fn on_timer(&mut self, _tick: u64) {}
 
     /// Returns the tick of the next timer; `None` where only a packet can make it go on.
-    fn next_timer(&self) -> Option<u64>;
+    fn next_timer(&self) -> Option<u64> {
+        None
+    }
 
     /// Takes out the packets to be sent, each once.
-    fn take_packets(&mut self) -> Vec<OutgoingPacket>;
+    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
+        Vec::new()
+    }
 
     /// Returns whether its control is ready.
     fn is_done(&self) -> bool;
@@ -72,10 +76,14 @@ pub trait AgentProgram: Send {
     fn activity(&self) -> AgentActivity;
 
     /// Returns the other agents that it has heard in this cycle, or in the one before if it has heard none yet.
-    fn heard_agents(&self) -> Vec<EntityId>;
+    fn heard_agents(&self) -> Vec<EntityId> {
+        Vec::new()
+    }
 
     /// Returns counts of packets that it has dropped, by reason.
-    fn drop_counts(&self) -> Vec<(String, u64)>;
+    fn drop_counts(&self) -> Vec<(String, u64)> {
+        Vec::new()
+    }
 
     /// Returns the time after which it wants to be polled; none where only what the node receives makes it go on.
     fn poll_interval(&self) -> Option<Duration> {

@@ -1,8 +1,7 @@
 //! Robots on a grid: their world at the server, and the program of one at each node.
 
 use crate::agent::{
-    AgentActivity, AgentPercept, AgentProgram, ChannelModel, InvalidControl, OutgoingPacket,
-    SerializedControls,
+    AgentActivity, AgentPercept, AgentProgram, ChannelModel, InvalidControl, SerializedControls,
 };
 use crate::distributed::DistributedWorld;
 use crate::protocol::CycleStart;
@@ -145,18 +144,6 @@ impl AgentProgram for RobotProgram {
         Ok(0)
     }
 
-    fn on_packet(&mut self, _: EntityId, _: &[u8], _: u64) {}
-
-    fn on_timer(&mut self, _: u64) {}
-
-    fn next_timer(&self) -> Option<u64> {
-        None
-    }
-
-    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
-        Vec::new()
-    }
-
     fn is_done(&self) -> bool {
         self.control.is_some()
     }
@@ -169,13 +156,5 @@ impl AgentProgram for RobotProgram {
     fn activity(&self) -> AgentActivity {
         let name = if self.is_done() { "done" } else { "rest" };
         AgentActivity { name, ..AgentActivity::default() }
-    }
-
-    fn heard_agents(&self) -> Vec<EntityId> {
-        Vec::new()
-    }
-
-    fn drop_counts(&self) -> Vec<(String, u64)> {
-        Vec::new()
     }
 }

@@ -4,7 +4,7 @@ use super::VehiclePort;
 use super::messages::{
     NO_CONTACT, RobotControlMessage, RobotDescription, RobotPerceptMessage, SensorDescription,
 };
-use crate::agent::{AgentActivity, AgentProgram, OutgoingPacket};
+use crate::agent::{AgentActivity, AgentProgram};
 use sidestep::import::bag::cdr;
 use sidestep::kernel::{Cycle, EntityId};
 use sidestep::worlds::robots::RobotsWorld;
@@ -116,18 +116,6 @@ impl AgentProgram for RobotVehicle {
         Ok(0)
     }
 
-    fn on_packet(&mut self, _: EntityId, _: &[u8], _: u64) {}
-
-    fn on_timer(&mut self, _: u64) {}
-
-    fn next_timer(&self) -> Option<u64> {
-        None
-    }
-
-    fn take_packets(&mut self) -> Vec<OutgoingPacket> {
-        Vec::new()
-    }
-
     fn is_done(&self) -> bool {
         self.control.is_some()
     }
@@ -144,10 +132,6 @@ impl AgentProgram for RobotVehicle {
             (None, false) => "rest",
         };
         AgentActivity { name, ..AgentActivity::default() }
-    }
-
-    fn heard_agents(&self) -> Vec<EntityId> {
-        Vec::new()
     }
 
     fn drop_counts(&self) -> Vec<(String, u64)> {
