@@ -33,7 +33,9 @@ DEADLINE_S = 120.0
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 TRIGGER_HASH = compute_service_type_hash(
     # The package refuses a request without any text, and counts a comment as none.
-    "std_srvs/srv/Trigger", "# nothing", "bool success\nstring message"
+    "std_srvs/srv/Trigger",
+    "# nothing",
+    "bool success\nstring message",
 )
 
 

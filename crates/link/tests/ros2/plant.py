@@ -88,9 +88,7 @@ class Robot:
         self.scan = topic(ROS2Publisher, f"/{self.name}/scan", "sensor_msgs/msg/LaserScan")
         self.bumper = topic(ROS2Publisher, f"/{self.name}/bumper", "std_msgs/msg/Bool")
         kind = "TwistStamped" if CONFIG.get("stamped") else "Twist"
-        self.heard = topic(
-            ROS2Subscriber, f"/{self.name}/cmd_vel", f"geometry_msgs/msg/{kind}", self.on_command
-        )
+        self.heard = topic(ROS2Subscriber, f"/{self.name}/cmd_vel", f"geometry_msgs/msg/{kind}", self.on_command)
 
     def on_command(self, message):
         message = getattr(message, "twist", message)
@@ -210,9 +208,7 @@ class Plant:
         for robot in self.robots:
             x, y, yaw = robot.start
             frames.append(messages.frame("map", f"{robot.name}/odom", (x, y), yaw))
-            frames.append(
-                messages.frame(f"{robot.name}/base", f"{robot.name}/laser", (MOUNT_M, 0.0), 0.0)
-            )
+            frames.append(messages.frame(f"{robot.name}/base", f"{robot.name}/laser", (MOUNT_M, 0.0), 0.0))
         self.frames.publish(transforms=frames)
 
     def send(self, robot):

@@ -30,15 +30,29 @@ REQUIRED = {
     "instantActions": {"actions": list},
     "connection": {"connectionState": str},
     "state": {
-        "orderId": str, "orderUpdateId": int, "lastNodeId": str, "lastNodeSequenceId": int, "nodeStates": list,
-        "edgeStates": list, "driving": bool, "actionStates": list, "batteryState": dict, "operatingMode": str,
-        "errors": list, "safetyState": dict,
+        "orderId": str,
+        "orderUpdateId": int,
+        "lastNodeId": str,
+        "lastNodeSequenceId": int,
+        "nodeStates": list,
+        "edgeStates": list,
+        "driving": bool,
+        "actionStates": list,
+        "batteryState": dict,
+        "operatingMode": str,
+        "errors": list,
+        "safetyState": dict,
     },
 }
 REQUIRED_OF_ITEMS = {
     "nodes": {"nodeId": str, "sequenceId": int, "released": bool, "actions": list},
     "edges": {
-        "edgeId": str, "sequenceId": int, "released": bool, "startNodeId": str, "endNodeId": str, "actions": list,
+        "edgeId": str,
+        "sequenceId": int,
+        "released": bool,
+        "startNodeId": str,
+        "endNodeId": str,
+        "actions": list,
     },
     "actions": {"actionType": str, "actionId": str, "blockingType": str},
     "nodeStates": {"nodeId": str, "sequenceId": int, "released": bool},
@@ -178,7 +192,10 @@ class Vehicle:
     def head(self, header):
         stamp = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime()) + ".00Z"
         return {
-            "headerId": header, "timestamp": stamp, "version": VERSION, "manufacturer": self.task["manufacturer"],
+            "headerId": header,
+            "timestamp": stamp,
+            "version": VERSION,
+            "manufacturer": self.task["manufacturer"],
             "serialNumber": self.serial,
         }
 
@@ -244,8 +261,10 @@ class Vehicle:
     def on_order(self, order, now):
         nodes = order["nodes"]
         refuse_after = self.faults.get("refuse_after")
-        if refuse_after is not None and len(self.visited) >= refuse_after and (
-            not self.has_refused or now < self.refused_until
+        if (
+            refuse_after is not None
+            and len(self.visited) >= refuse_after
+            and (not self.has_refused or now < self.refused_until)
         ):
             if not self.has_refused:
                 self.refuse("orderError", now, self.faults.get("refuse_s", 1.0))
@@ -314,15 +333,25 @@ class Vehicle:
             return
         ahead = [{key: node[key] for key in ("nodeId", "sequenceId", "released")} for node in self.ahead]
         message = self.head(self.header) | {
-            "orderId": self.order_id, "orderUpdateId": self.update, "lastNodeId": self.last_node_id,
-            "lastNodeSequenceId": self.last_sequence, "nodeStates": ahead, "edgeStates": [],
+            "orderId": self.order_id,
+            "orderUpdateId": self.update,
+            "lastNodeId": self.last_node_id,
+            "lastNodeSequenceId": self.last_sequence,
+            "nodeStates": ahead,
+            "edgeStates": [],
             "agvPosition": {
-                "x": self.at[0], "y": self.at[1], "theta": 0.0, "mapId": self.task["map_id"],
+                "x": self.at[0],
+                "y": self.at[1],
+                "theta": 0.0,
+                "mapId": self.task["map_id"],
                 "positionInitialized": True,
             },
-            "driving": self.target is not None, "actionStates": self.actions,
-            "batteryState": {"batteryCharge": 77.0, "charging": False}, "operatingMode": "AUTOMATIC",
-            "errors": self.errors, "safetyState": {"eStop": "NONE", "fieldViolation": False},
+            "driving": self.target is not None,
+            "actionStates": self.actions,
+            "batteryState": {"batteryCharge": 77.0, "charging": False},
+            "operatingMode": "AUTOMATIC",
+            "errors": self.errors,
+            "safetyState": {"eStop": "NONE", "fieldViolation": False},
         }
         self.header += 1
         self.checker.check("state", message)
@@ -395,8 +424,12 @@ def main():
         time.sleep(TICK_S)
     result = {
         "vehicles": [vehicle.result() for vehicle in vehicles],
-        "conflicts": floor.conflicts, "entries": floor.entries, "checked": checker.counts,
-        "invalid": checker.invalid, "skipped": checker.skipped, "wills": witness.wills,
+        "conflicts": floor.conflicts,
+        "entries": floor.entries,
+        "checked": checker.counts,
+        "invalid": checker.invalid,
+        "skipped": checker.skipped,
+        "wills": witness.wills,
     }
     print(json.dumps(result), flush=True)
     os._exit(0)
