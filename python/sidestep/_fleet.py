@@ -201,7 +201,7 @@ class Fleet:
         self._logger = threading.Thread(target=_read_log, args=(self._process.stderr, self.log), daemon=True)
         self._logger.start()
         try:
-            stdin.write(json.dumps(job).encode() + b"\n")
+            stdin.write(json.dumps({"fleet": job}).encode() + b"\n")
             stdin.flush()
         except BrokenPipeError:
             # It has ended, and its own message says why.
@@ -228,6 +228,9 @@ class Fleet:
         """Waits until the fleet has ended, and returns its summary.
 
         Raises InputError when its input is wrong, and FleetError when it fails. Ctrl-C ends the fleet in good order.
+
+        >>> fleet.wait()["digest"]  # doctest: +SKIP
+        '7f2a840188d623ea0ca6f30d201bb60d'
         """
         try:
             for _ in self:
@@ -243,6 +246,10 @@ class Fleet:
         """Asks the fleet to end in good order, and waits for that; an ended one stays as it is.
 
         What was flown is in :attr:`summary` and in the folder ``out``.
+
+        >>> fleet.end()  # doctest: +SKIP
+        >>> fleet.is_over  # doctest: +SKIP
+        True
         """
         self._finalizer()
         for message in iter(self._messages.get, None):

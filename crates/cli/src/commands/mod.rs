@@ -51,13 +51,13 @@ pub(crate) enum Command {
     Run(run::RunArgs),
     /// Watch, steer, replay and edit in the browser
     Studio(studio::StudioArgs),
-    /// Run a scenario with a process for each airplane, connector or robot
+    /// Run a scenario with a process for each of its agents
     Fleet(Box<fleet::FleetArgs>),
-    /// Run one airplane, connector or robot of a fleet on this machine
+    /// Run one agent of a fleet on this machine
     Node(Box<node::NodeArgs>),
     /// Let vehicles of a warehouse carry out a plan, by VDA 5050
     Dispatch(Box<dispatch::DispatchArgs>),
-    /// Drive a real robot of ROS 2 by the program of a robot of a scenario
+    /// Drive a real robot of ROS 2 by the program of a simulated one
     Drive(Box<drive::DriveArgs>),
     /// Validate a scenario and describe it, without running it
     Check(check::CheckArgs),

@@ -20,7 +20,6 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep run scenarios/robots/office.toml --out runs/office
   sidestep run office.toml --cycles 50000 --seed 7 --workers 4
-  sidestep run office.toml --regime sensors --set robots.0.count=40
   sidestep run office.toml --replicate 100 --vary regime=reliable,both
   sidestep run office.toml --json | jq .metrics.contacts
   sidestep run office.toml --mcap office.mcap    for Foxglove and other viewers

@@ -46,8 +46,8 @@ use std::process::ExitCode;
 
 /// Usage, for a user who starts the program by hand.
 const USAGE: &str = "\
-sidestep-link runs the server and the nodes of a fleet, shows runs to ROS 2, and drives robots. `sidestep fleet`,
-`sidestep node`, `sidestep run --ros2` and `sidestep drive` start it and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
+sidestep-link runs the server and the nodes of a fleet, shows runs to ROS 2, drives robots and leads vehicles. `sidestep fleet`, `node`,
+`run --ros2`, `drive` and `dispatch` start it and tell it, in a line of JSON, what to do: see `sidestep fleet --help`.";
 
 /// Does the job that standard input asks for. Exit codes are those of `sidestep`.
 pub fn main() -> ExitCode {

@@ -19,13 +19,16 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     paths.flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] }).collect()
 }
 
+/// Files that write the wall clock into messages for others, as ROS 2 and VDA 5050 ask for; nothing here reads it there.
+const DATED: [&str; 2] = ["ros2/node.rs", "program/dispatch.rs"];
+
 /// Certificates and logs have dates; their libraries know them.
 #[test]
 fn no_code_of_fleets_names_the_wall_clock() {
     let all = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
     assert!(all.len() > 20, "{all:?}");
-    for path in all {
-        let text = std::fs::read_to_string(&path).expect("text");
+    for path in all.iter().filter(|path| !DATED.iter().any(|dated| path.ends_with(dated))) {
+        let text = std::fs::read_to_string(path).expect("text");
         for name in ["SystemTime", "UNIX_EPOCH"] {
             assert!(!text.contains(name), "{name} in {}", path.display());
         }

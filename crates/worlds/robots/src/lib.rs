@@ -62,6 +62,7 @@ mod run_plan;
 pub mod scenario;
 mod simultaneous;
 pub mod state;
+mod submitted_controls;
 mod table_notes;
 mod team;
 mod team_delays;

@@ -14,37 +14,12 @@ mod tests;
 use super::Scratch;
 use super::agents::{RobotControl, RobotPercept};
 use super::cycle_context::with_cycle;
-use super::decide::{Decision, Memory};
-use super::effector::STAY;
 use super::state::RobotsState;
+use super::submitted_controls::SubmittedControls;
 use super::world::RobotsWorld;
 use sidestep_kernel::control::OrderError;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
 use std::collections::BTreeMap;
-
-/// The controls of robots for one cycle; none before the first ones.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct SubmittedControls {
-    /// The cycle for which they are.
-    cycle: Option<Cycle>,
-    by_id: BTreeMap<EntityId, RobotControl>,
-}
-
-impl SubmittedControls {
-    /// Returns the controls if they are for this cycle: then all robots decide outside of the run.
-    #[inline(always)]
-    pub(crate) fn of_cycle(&self, now: Cycle) -> Option<&Self> {
-        (self.cycle == Some(now)).then_some(self)
-    }
-
-    /// Returns the decision of a robot and its memory after that, which is `before` if it has sent nothing.
-    pub(crate) fn decision(&self, id: EntityId, before: Memory) -> (Decision, Memory) {
-        match self.by_id.get(&id) {
-            Some(control) => (control.decision(), Memory { words: control.memory }),
-            None => (STAY.into(), before),
-        }
-    }
-}
 
 impl RobotsWorld {
     /// Returns the number of robots, whose ids are those below.
@@ -165,7 +140,7 @@ impl RobotsWorld {
                 return Err(refused("there are two of it; give one for each robot".into()));
             }
         }
-        state.submitted = SubmittedControls { cycle: Some(now), by_id };
+        state.submitted = SubmittedControls::new(now, by_id);
         Ok(())
     }
 }
