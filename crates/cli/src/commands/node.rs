@@ -19,7 +19,8 @@ Examples:
       --listen tcp/10.0.0.4:0 --insecure
                                    connector 3 of chain 0
   sidestep node office.toml --robot 2 --connect tcp/10.0.0.1:7600 --insecure
-  sidestep node office.toml --robot 2 --connect tcp/127.0.0.1:7600 --vehicle tcp/127.0.0.1:7700
+  sidestep node office.toml --robot 2 --connect tcp/127.0.0.1:7600 \\
+      --vehicle tcp/127.0.0.1:7700
                                    your own program decides: see examples/vehicle.py
 
 Give it the scenario, --set, --seed and --cycles of the fleet, and on a network that you do not trust certificates in place of --insecure. It runs its agent until the fleet \

@@ -268,6 +268,9 @@ fn four_robots_arrive_among_each_other_touch_nothing_and_leave_tables_of_their_m
         })
         .collect();
     let ends: Vec<DriveStatus> = drives.iter().map(DriveProcess::end).collect();
+    // It waits for the last command of each, which may be on its way when the program has ended.
+    let silence = plants.ask("silence");
+    assert_eq!(silence["velocities"], json!([[0.0, 0.0]; 4]), "all are told to stand at the end");
     let report = plants.ask("report");
     for (k, (_, goal)) in robots.iter().enumerate() {
         let robot = &report[k];
@@ -275,7 +278,6 @@ fn four_robots_arrive_among_each_other_touch_nothing_and_leave_tables_of_their_m
         assert_eq!((ends[k].unreadable, ends[k].off_map), (0, 0), "{:?}", ends[k]);
         assert!(is_at(robot, *goal), "robot {k}: {robot}");
         assert_eq!(robot["touches"], 0, "robot {k}: {robot}");
-        assert_eq!(robot["velocity"], json!([0.0, 0.0]), "it is told to stand at the end");
         let fastest = [0, 1].map(|axis| robot["fastest"][axis].as_f64().expect("a speed"));
         assert!(fastest[0] <= 0.4 + 1e-9 && fastest[1] <= 1.2 + 1e-9, "{robot}");
         let table = std::fs::read_to_string(folder.path(&format!("motions-{k}.csv")));
@@ -321,7 +323,7 @@ fn a_robot_that_is_interrupted_on_its_way_is_told_to_stand() {
     let graph = drive.graph();
     assert_eq!(graph.node, "/robot_0/sidestep_drive_0");
     let commands = ("/robot_0/cmd_vel".to_string(), "geometry_msgs/msg/TwistStamped".to_string());
-    assert_eq!(graph.topics.first(), Some(&commands), "{graph:?}");
+    assert!(graph.topics.contains(&commands), "{graph:?}");
     drive.wait_for(|status| status.actions >= 2);
     let end = drive.interrupt();
     assert_eq!(end.trips, 0);
