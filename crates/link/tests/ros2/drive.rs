@@ -270,7 +270,11 @@ fn four_robots_arrive_among_each_other_touch_nothing_and_leave_tables_of_their_m
     let ends: Vec<DriveStatus> = drives.iter().map(DriveProcess::end).collect();
     // It waits for the last command of each, which may be on its way when the program has ended.
     let silence = plants.ask("silence");
-    assert_eq!(silence["velocities"], json!([[0.0, 0.0]; 4]), "all are told to stand at the end");
+    assert_eq!(
+        silence["velocities"],
+        json!(vec![[0.0, 0.0]; 4]),
+        "all are told to stand at the end"
+    );
     let report = plants.ask("report");
     for (k, (_, goal)) in robots.iter().enumerate() {
         let robot = &report[k];
