@@ -69,6 +69,11 @@ pub trait DistributedWorld: Send + Sync {
     /// Returns the program of an agent, which accepts packets only from programs of the same build.
     fn program(&self, agent: EntityId, build: &str) -> Box<dyn AgentProgram>;
 
+    /// Returns whether vehicles may decide for its agents: these have public messages.
+    fn has_vehicles(&self) -> bool {
+        false
+    }
+
     /// Returns the program of an agent that a vehicle decides for, which is beyond a port; none where agents of this world
     /// have no public messages.
     fn vehicle_program(

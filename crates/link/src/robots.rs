@@ -111,6 +111,10 @@ impl DistributedWorld for DistributedRobots {
         Box::new(RobotProgram { agent: self.agent(agent), control: None })
     }
 
+    fn has_vehicles(&self) -> bool {
+        true
+    }
+
     fn vehicle_program(
         &self,
         agent: EntityId,
@@ -124,6 +128,18 @@ impl DistributedWorld for DistributedRobots {
     }
 }
 
+/// Reads the percept of a robot for a cycle.
+///
+/// # Errors
+/// When it is none, or of another cycle, with the reason.
+pub(crate) fn read_percept(cycle: Cycle, bytes: &[u8]) -> Result<RobotPercept, String> {
+    let percept: RobotPercept = postcard::from_bytes(bytes).map_err(|e| e.to_string())?;
+    if percept.cycle != cycle {
+        return Err("it is of another cycle".into());
+    }
+    Ok(percept)
+}
+
 /// The program of a robot, at a node: it decides as soon as it perceives.
 struct RobotProgram {
     agent: RobotAgent,
@@ -135,11 +151,7 @@ impl AgentProgram for RobotProgram {
     fn start_cycle(&mut self, cycle: Cycle, percept: &[u8]) -> Result<u64, String> {
         // Of the cycle before.
         self.control = None;
-        let percept: RobotPercept = postcard::from_bytes(percept).map_err(|e| e.to_string())?;
-        if percept.cycle != cycle {
-            return Err("it is of another cycle".into());
-        }
-        self.control = Some(self.agent.decide(&percept)?);
+        self.control = Some(self.agent.decide(&read_percept(cycle, percept)?)?);
         // A cycle of robots has no ticks.
         Ok(0)
     }

@@ -45,6 +45,13 @@ pub(super) fn run(
         .map(|endpoint| reserve_port(endpoint))
         .collect::<Result<_, _>>()
         .map_err(endpoint_error)?;
+    if vehicle.is_some() && !scenario.world.has_vehicles() {
+        let cause =
+            format!("there are no public messages for an agent of the kind `{}`", job.agent.noun);
+        let remedy =
+            "leave it out, and the node decides by itself; robots alone may have a vehicle";
+        return Err(InputError::new("--vehicle", cause, remedy).into());
+    }
     let port = vehicle.map(|endpoint| serve_vehicle(&job.agent, endpoint)).transpose()?;
     let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
     let timeout = Duration::from_secs_f64(job.patience_s);
@@ -82,16 +89,7 @@ pub(super) fn run(
         None => Some(scenario.world.program(agent, build)),
         Some(port) => scenario.world.vehicle_program(agent, Box::new(port)),
     };
-    let program = program.ok_or_else(|| {
-        seat.leave("agents of its world have no vehicles");
-        let noun = &job.agent.noun;
-        let cause = format!("there are no public messages for an agent of the kind `{noun}`");
-        InputError::new(
-            "--vehicle",
-            cause,
-            "give it for robots; without it the node decides itself",
-        )
-    })?;
+    let program = program.expect("`has_vehicles` was checked");
     let channel = scenario.world.channel(agent);
     let name = job.agent.clone();
     tracing::info!(agent, who = format!("{} {name}", name.noun), "joined");

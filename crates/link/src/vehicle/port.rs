@@ -4,6 +4,7 @@ use super::WIRE_VERSION;
 use crate::wire::endpoint::WireSetupError;
 use crate::wire::zenoh::open_vehicle_session;
 use sidestep_session::fleet::AgentName;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use zenoh::pubsub::{Publisher, Subscriber};
@@ -24,14 +25,18 @@ pub trait VehiclePort: Send {
     /// Sends a percept.
     fn send(&mut self, percept: &[u8]);
 
-    /// Returns the next control that has arrived, without waiting.
+    /// Returns the next control that has arrived, without waiting; an empty one in place of one that is too long.
     fn receive(&mut self) -> Option<Vec<u8>>;
+
+    /// Returns the number of controls that found no room, because too many came.
+    fn overflow_count(&self) -> u64;
 }
 
 /// A link by Zenoh, with a key for each sort of message: `sidestep/v1/robot/3/percept`, `control` and `description`.
 pub(crate) struct ZenohPort {
     percepts: Publisher<'static>,
     controls: Receiver<Vec<u8>>,
+    overflows: Arc<AtomicU64>,
     description: Arc<Mutex<Vec<u8>>>,
     _subscriber: Subscriber<()>,
     _queryable: Queryable<()>,
@@ -55,13 +60,17 @@ impl ZenohPort {
         };
         let percepts = session.declare_publisher(key("percept")).wait().map_err(failed)?;
         let (sender, controls) = sync_channel(MAX_WAITING);
+        let overflows = Arc::new(AtomicU64::new(0));
+        let counted = overflows.clone();
         let subscriber = session
             .declare_subscriber(key("control"))
             .callback(move |sample| {
                 let payload = sample.payload();
-                if payload.len() <= MAX_CONTROL_BYTES {
-                    // One that finds no room is lost, as one over a network may be; the vehicle is asked again.
-                    let _ = sender.try_send(payload.to_bytes().into_owned());
+                let is_short = payload.len() <= MAX_CONTROL_BYTES;
+                // Without its bytes it is counted as damaged, and takes no memory.
+                let bytes = if is_short { payload.to_bytes().into_owned() } else { Vec::new() };
+                if sender.try_send(bytes).is_err() {
+                    counted.fetch_add(1, Ordering::Relaxed);
                 }
             })
             .wait()
@@ -81,6 +90,7 @@ impl ZenohPort {
         Ok(Self {
             percepts,
             controls,
+            overflows,
             description,
             _subscriber: subscriber,
             _queryable: queryable,
@@ -101,5 +111,9 @@ impl VehiclePort for ZenohPort {
 
     fn receive(&mut self) -> Option<Vec<u8>> {
         self.controls.try_recv().ok()
+    }
+
+    fn overflow_count(&self) -> u64 {
+        self.overflows.load(Ordering::Relaxed)
     }
 }

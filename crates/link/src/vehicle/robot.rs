@@ -5,6 +5,7 @@ use super::messages::{
     NO_CONTACT, RobotControlMessage, RobotDescription, RobotPerceptMessage, SensorDescription,
 };
 use crate::agent::{AgentActivity, AgentProgram};
+use crate::robots::read_percept;
 use sidestep::import::bag::cdr;
 use sidestep::kernel::{Cycle, EntityId};
 use sidestep::worlds::robots::RobotsWorld;
@@ -104,10 +105,7 @@ impl RobotVehicle {
 
 impl AgentProgram for RobotVehicle {
     fn start_cycle(&mut self, cycle: Cycle, percept: &[u8]) -> Result<u64, String> {
-        let percept: RobotPercept = postcard::from_bytes(percept).map_err(|e| e.to_string())?;
-        if percept.cycle != cycle {
-            return Err("it is of another cycle".into());
-        }
+        let percept = read_percept(cycle, percept)?;
         self.control = None;
         let bytes = cdr::encode(&percept_message(&percept));
         self.open = Some(OpenPercept { cycle, bytes, sent_at: Instant::now() });
@@ -135,7 +133,12 @@ impl AgentProgram for RobotVehicle {
     }
 
     fn drop_counts(&self) -> Vec<(String, u64)> {
-        self.dropped.iter().map(|(reason, &count)| ((*reason).to_string(), count)).collect()
+        let mut dropped = self.dropped.clone();
+        let overflows = self.port.overflow_count();
+        if overflows > 0 {
+            dropped.insert("vehicle-too-many", overflows);
+        }
+        dropped.into_iter().map(|(reason, count)| (reason.to_string(), count)).collect()
     }
 
     fn poll_interval(&self) -> Option<Duration> {
@@ -239,6 +242,10 @@ mod tests {
         fn receive(&mut self) -> Option<Vec<u8>> {
             self.0.lock().expect("no panic").controls.pop_front()
         }
+
+        fn overflow_count(&self) -> u64 {
+            2
+        }
     }
 
     const FLOOR: &str = "format = 1\nworld = \"robots\"\nseed = 2\n[map]\nascii = \"\"\"\n.....\n.....\n\"\"\"\n\
@@ -316,6 +323,7 @@ mod tests {
             count("vehicle-impossible", 3),
             count("vehicle-other-cycle", 1),
             count("vehicle-other-robot", 1),
+            count("vehicle-too-many", 2),
         ];
         assert_eq!(vehicle.drop_counts(), expected);
     }

@@ -1,7 +1,7 @@
 //! Robots for which a program of a user decides, over the public wire: `examples/vehicle.py`, as its users run it.
 
 use crate::processes::{LinkProcess, folder, job};
-use crate::support::run_in_one_process;
+use crate::support::{run_in_one_process, superconflict};
 use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
     AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Topology, VehicleJob,
@@ -127,4 +127,16 @@ fn an_endpoint_for_a_vehicle_that_others_reach_needs_insecure_and_other_worlds_h
     let open = vehicle_job(&fleet, "tcp/127.0.0.1:1", "tcp/0.0.0.0:7700");
     let said = crate::input::refused(&open);
     assert!(said.contains("--insecure"), "{said}");
+    let ring = crate::processes::folder(&superconflict(3, "team", 5, ""));
+    let fleet = job(ring.path(), Topology::Star, ClockMode::Lockstep);
+    let node = NodeJob {
+        common: fleet.common,
+        agent: AgentName::new("airplane", 2, None),
+        connect: vec!["tcp/127.0.0.1:1".into()],
+        listen: Vec::new(),
+        patience_s: 1.0,
+    };
+    let endpoint = "tcp/127.0.0.1:0".into();
+    let said = crate::input::refused(&Job::Vehicle(VehicleJob { node, endpoint }));
+    assert!(said.contains("no public messages for an agent of the kind `airplane`"), "{said}");
 }
