@@ -11,6 +11,7 @@
 //! agent.rs           the interface of an agent's program, of its percepts, controls and packets
 //! distributed.rs     the interface of a world whose agents are processes
 //! worlds.rs          the worlds that have it: airspace.rs (pilots), chain.rs (connectors), robots.rs
+//! robot_percept.rs   percepts of robots, as the server sends them
 //! faults.rs          the faults of the scenario's network, for the packets of one agent
 //! recent_senders.rs  the senders that an agent has heard lately
 //! replay_window.rs   which frames of a peer have arrived
@@ -42,6 +43,7 @@ pub mod program;
 pub mod protocol;
 mod recent_senders;
 mod replay_window;
+mod robot_percept;
 mod robots;
 pub mod ros2;
 pub mod server;

@@ -5,9 +5,10 @@ use crate::agent::{
 };
 use crate::distributed::DistributedWorld;
 use crate::protocol::CycleStart;
+use crate::robot_percept::read_percept;
 use crate::vehicle::{RobotVehicle, VehiclePort};
 use sidestep::kernel::{Cycle, EntityId, Simulation, World};
-use sidestep::worlds::robots::agents::{RobotAgent, RobotControl, RobotPercept};
+use sidestep::worlds::robots::agents::{RobotAgent, RobotControl};
 use sidestep::worlds::robots::world::CYCLE_S;
 use sidestep::worlds::robots::{RobotsRun, RobotsWorld};
 use sidestep_session::fleet::AgentName;
@@ -126,18 +127,6 @@ impl DistributedWorld for DistributedRobots {
     fn channel(&self, _: EntityId) -> Option<Box<dyn ChannelModel>> {
         None
     }
-}
-
-/// Reads the percept of a robot for a cycle.
-///
-/// # Errors
-/// When it is none, or of another cycle, with the reason.
-pub(crate) fn read_percept(cycle: Cycle, bytes: &[u8]) -> Result<RobotPercept, String> {
-    let percept: RobotPercept = postcard::from_bytes(bytes).map_err(|e| e.to_string())?;
-    if percept.cycle != cycle {
-        return Err("it is of another cycle".into());
-    }
-    Ok(percept)
 }
 
 /// The program of a robot, at a node: it decides as soon as it perceives.

@@ -5,7 +5,7 @@ use super::messages::{
     NO_CONTACT, RobotControlMessage, RobotDescription, RobotPerceptMessage, SensorDescription,
 };
 use crate::agent::{AgentActivity, AgentProgram};
-use crate::robots::read_percept;
+use crate::robot_percept::read_percept;
 use sidestep::import::bag::cdr;
 use sidestep::kernel::{Cycle, EntityId};
 use sidestep::worlds::robots::RobotsWorld;
