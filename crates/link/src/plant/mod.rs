@@ -1,11 +1,13 @@
-//! A real robot as its program sees it: measurements of its own in, velocities out.
+//! A real vehicle as its program sees it: measurements of its own in, commands out.
 //!
 //! ```text
-//! frames.rs  frames in other frames, as /tf tells them
-//! inbox.rs   the last messages of a robot, and what is wrong with others
-//! ros2.rs    a robot that is a node of ROS 2
+//! aircraft.rs  an aircraft
+//! frames.rs    frames in other frames, as /tf tells them
+//! inbox.rs     the last messages of a robot, and what is wrong with others
+//! ros2.rs      a robot that is a node of ROS 2
 //! ```
 
+pub mod aircraft;
 pub mod frames;
 pub mod inbox;
 pub mod ros2;
