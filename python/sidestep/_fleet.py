@@ -55,6 +55,10 @@ class NodeStatus:
     #: Packets that it has sent, and their bytes.
     packets: int
     bytes: int
+    #: Bytes of all frames that it has sent: packets, controls and its status.
+    frame_bytes: int
+    #: Processor time in milliseconds that its process has used since its first cycle; None where its system does not tell.
+    processor_ms: int | None
     #: Seconds since it was last heard; None before it has joined.
     silent_s: float | None
 
@@ -76,6 +80,8 @@ class FleetStatus:
     #: the first cycle.
     talk_p50_ms: float | None
     talk_p99_ms: float | None
+    #: Bytes of all frames that the server has sent, percepts for the most part.
+    server_frame_bytes: int
     #: What an agent of the world is called, e.g. ``"airplane"``.
     noun: str
     #: Names of the agents for which all wait, because their nodes are not heard.

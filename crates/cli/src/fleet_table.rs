@@ -3,6 +3,7 @@
 use crate::console::Console;
 use crate::progress::RunBar;
 use sidestep::kernel::terminal::escape_controls_in_lines;
+use sidestep_document::estimate::format_short;
 use sidestep_session::fleet::{FleetStatus, NodeStatus};
 use std::fmt::Write;
 use std::io::{IsTerminal, Write as _};
@@ -110,8 +111,8 @@ fn heading(now: &FleetStatus) -> String {
 }
 
 /// Returns a time, or a dash if nothing has been measured yet.
-fn format_ms(time_ms: Option<f64>) -> String {
-    time_ms.map_or("-".into(), |ms| ms.to_string())
+pub(crate) fn format_ms(time_ms: Option<f64>) -> String {
+    time_ms.map_or("-".into(), |ms| format_short(ms))
 }
 
 /// Returns a line with the nodes that the fleet waits for, if there are any.

@@ -15,6 +15,7 @@
 //! faults.rs          the faults of the scenario's network, for the packets of one agent
 //! recent_senders.rs  the senders that an agent has heard lately
 //! replay_window.rs   which frames of a peer have arrived
+//! resource_usage.rs  the processor time of a process
 //! hosted_run.rs      the recorded run at the server
 //! server/            the server of the world
 //! vehicle/           programs of users that decide in place of an agent's own, over a public wire
@@ -43,6 +44,7 @@ pub mod program;
 pub mod protocol;
 mod recent_senders;
 mod replay_window;
+mod resource_usage;
 mod robot_percept;
 mod robots;
 pub mod ros2;

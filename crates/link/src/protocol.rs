@@ -268,6 +268,11 @@ pub struct NodeStatusReport {
     pub packets: u64,
     /// Bytes of these packets.
     pub bytes: u64,
+    /// Bytes of all frames that it has sent: packets, controls and its status, but no headers of the network.
+    pub frame_bytes: u64,
+    /// Processor time in milliseconds that its process has used since its first cycle began; none where its system does
+    /// not tell.
+    pub processor_ms: Option<u64>,
     /// Messages that were retransmitted.
     pub retries: u64,
     /// Frames and packets that it has dropped, by reason.

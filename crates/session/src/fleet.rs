@@ -510,6 +510,8 @@ pub struct FleetStatus {
     pub talk_p50_ms: Option<f64>,
     /// The time in milliseconds below which 99 of 100 of them are.
     pub talk_p99_ms: Option<f64>,
+    /// Bytes of all frames that the server has sent, percepts for the most part.
+    pub server_frame_bytes: u64,
     /// What people call an agent of this world, e.g. `airplane`.
     pub noun: String,
     /// Names of the agents for which all wait, because their nodes are not heard.
@@ -552,6 +554,11 @@ pub struct NodeStatus {
     pub packets: u64,
     /// Bytes of these packets.
     pub bytes: u64,
+    /// Bytes of all frames that it has sent: packets, controls and its status, but no headers of the network.
+    pub frame_bytes: u64,
+    /// Processor time in milliseconds that its process has used since its first cycle; none where its system does not
+    /// tell.
+    pub processor_ms: Option<u64>,
     /// Packets that it sends in a second.
     pub packets_per_s: f64,
     /// Bytes that it sends in a second.

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use sidestep::kernel::InputError;
 use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::text::{KeyValues, key_value_pair};
+use sidestep_document::estimate::format_short;
 use sidestep_session::fleet::{
     ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology, check_loopback_multicast,
 };
@@ -178,6 +179,24 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     }
 }
 
+/// Returns a line with what a node used in the mean, per second in which the fleet ran; none where that is not known.
+fn usage_line(fleet: &FleetStatus) -> Option<(String, String)> {
+    let node_s = fleet.flown_s * fleet.nodes.len() as f64;
+    if node_s <= 0.0 {
+        return None;
+    }
+    let bytes: u64 = fleet.nodes.iter().map(|node| node.frame_bytes).sum();
+    let processor_ms: Option<u64> = fleet.nodes.iter().map(|node| node.processor_ms).sum();
+    let processor = processor_ms.map_or(String::new(), |ms| {
+        let percent = 0.1 * ms as f64 / node_s;
+        format!("{} % of a processor, ", format_short(percent))
+    });
+    let kilobytes = format_short(1e-3 * bytes as f64 / node_s);
+    let server_kilobytes = format_short(1e-3 * fleet.server_frame_bytes as f64 / fleet.flown_s);
+    let usage = format!("{processor}{kilobytes} kB/s; the server {server_kilobytes} kB/s");
+    Some(key_value_pair("a node", usage))
+}
+
 impl FleetArgs {
     /// Checks that a multicast group is given only where nodes use one.
     ///
@@ -311,6 +330,13 @@ impl FleetArgs {
             );
             lines.push(key_value_pair("late", late));
         }
+        if let (Some(half_ms), Some(most_ms)) = (fleet.talk_p50_ms, fleet.talk_p99_ms) {
+            let half_ms = format_short(half_ms);
+            let most_ms = format_short(most_ms);
+            let times = format!("{half_ms} ms for half of the cycles, {most_ms} ms for 99 %");
+            lines.push(key_value_pair("percept to control", times));
+        }
+        lines.extend(usage_line(fleet));
         if restarted > 0 {
             lines.push(key_value_pair("restarted", format!("{restarted} nodes")));
         }

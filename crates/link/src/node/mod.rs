@@ -16,6 +16,7 @@ use crate::messenger::ReceivedMessage;
 use crate::protocol::{
     AgentPacket, ClockMode, CycleStart, FleetMember, JoinError, Message, NodeStatusReport, Welcome,
 };
+use crate::resource_usage::processor_time_ms;
 use crate::wire::{PeerId, WireSetupError};
 use agent_cycle::{AgentCycle, AgentCycleIo};
 pub use join::{JoinConfig, join};
@@ -102,6 +103,9 @@ pub struct Node {
     /// Packets of a cycle that has not started here.
     early_packets: Vec<(EntityId, AgentPacket)>,
     status: NodeStatusReport,
+    /// Processor time in milliseconds that the process had used when its first cycle began: reading a scenario is no part
+    /// of flying it.
+    processor_start_ms: Option<u64>,
     /// The activity that was logged last, and its cycle: only changes are logged.
     logged_activity: (Cycle, &'static str),
     report_at: Instant,
@@ -137,6 +141,7 @@ impl Node {
             cycle: None,
             early_packets: Vec::new(),
             status: NodeStatusReport::default(),
+            processor_start_ms: None,
             logged_activity: Default::default(),
             report_at: Instant::now(),
             reopen_at: Instant::now(),
@@ -294,6 +299,9 @@ impl Node {
         let first_tick =
             self.program.start_cycle(start.cycle, &start.percept).map_err(NodeError::Percept)?;
         self.status.cycle = start.cycle;
+        if self.processor_start_ms.is_none() {
+            self.processor_start_ms = processor_time_ms();
+        }
         let tick_s = self.channel.as_mut().map(|channel| {
             channel.start_cycle(start.cycle);
             channel.tick_s()
@@ -424,6 +432,9 @@ impl Node {
         self.status.epoch = activity.epoch;
         self.status.heard = self.program.heard_agents();
         self.status.retries = stats.retries;
+        self.status.frame_bytes = stats.bytes;
+        let processor_ms = self.processor_start_ms.zip(processor_time_ms());
+        self.status.processor_ms = processor_ms.map(|(start_ms, now_ms)| now_ms - start_ms);
         self.status.dropped = dropped.chain(self.program.drop_counts()).collect();
     }
 }

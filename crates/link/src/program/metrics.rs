@@ -158,7 +158,7 @@ struct NodeMetric {
     value: fn(&NodeStatus) -> f64,
 }
 
-const NODE_METRICS: [NodeMetric; 8] = [
+const NODE_METRICS: [NodeMetric; 9] = [
     NodeMetric {
         name: "node_up",
         kind: "gauge",
@@ -196,6 +196,12 @@ const NODE_METRICS: [NodeMetric; 8] = [
         value: |node| node.bytes as f64,
     },
     NodeMetric {
+        name: "node_frame_bytes_total",
+        kind: "counter",
+        help: "Bytes of all frames that a node has sent.",
+        value: |node| node.frame_bytes as f64,
+    },
+    NodeMetric {
         name: "epoch",
         kind: "gauge",
         help: "Epoch of the coordinator that a node follows.",
@@ -220,6 +226,17 @@ fn push_node_metrics(text: &mut MetricsText, status: &FleetStatus, fleet: &Fleet
         Some((format_label(&status.noun, &node.name), &entry.status))
     });
     push_messenger_metrics(text, &statuses.collect::<Vec<_>>());
+    // Some systems do not tell it.
+    let processor_times = status.nodes.iter().filter_map(|node| {
+        let processor_s = 1e-3 * node.processor_ms? as f64;
+        Some((format_label(&status.noun, &node.name), processor_s))
+    });
+    text.push_per_agent(
+        "node_processor_seconds_total",
+        "counter",
+        "Processor time that a node has used since its first cycle.",
+        processor_times,
+    );
 }
 
 /// Returns a label with its value between quotes, where a quote, a backslash and the end of a line are escaped.

@@ -31,15 +31,23 @@ impl Histogram {
         self.counts.iter().sum()
     }
 
-    /// Returns the lowest bound in seconds below which a fraction of the durations lies; `None` without durations, and
-    /// infinity above the last bound.
+    /// Returns the duration in seconds below which a fraction of the durations lies, as if those of a bucket were spread
+    /// evenly over it, as Prometheus' `histogram_quantile` takes them; `None` without durations, and infinity above the
+    /// last bound.
     pub fn quantile(&self, fraction: f64) -> Option<f64> {
         if self.count() == 0 {
             return None;
         }
-        let rank = (fraction * self.count() as f64).ceil().max(1.0) as u64;
-        let bound = self.cumulative_counts().find(|(_, count)| *count >= rank);
-        Some(bound.map_or(f64::INFINITY, |(bound_s, _)| bound_s))
+        let rank = fraction * self.count() as f64;
+        let mut lower = (0.0, 0);
+        for (bound_s, count) in self.cumulative_counts() {
+            if count > 0 && count as f64 >= rank {
+                let share = (rank - lower.1 as f64) / (count - lower.1) as f64;
+                return Some(lower.0 + share * (bound_s - lower.0));
+            }
+            lower = (bound_s, count);
+        }
+        Some(f64::INFINITY)
     }
 
     /// Returns, for each bound, the number of durations that do not exceed it.
@@ -67,5 +75,20 @@ mod tests {
         assert_eq!((at_most(0.001), at_most(0.002), at_most(0.005), at_most(60.0)), (1, 2, 3, 3));
         assert_eq!(histogram.count(), 4);
         assert!((histogram.sum_s - 100.006).abs() < 1e-9);
+    }
+
+    #[test]
+    fn quantiles_lie_within_their_buckets_in_proportion_to_the_counts() {
+        let mut histogram = Histogram::default();
+        assert_eq!(histogram.quantile(0.5), None);
+        for _ in 0..10 {
+            histogram.record(Duration::from_millis(7));
+        }
+        // All ten are in the bucket from 5 to 10 ms.
+        assert!((histogram.quantile(0.5).expect("durations") - 0.0075).abs() < 1e-12);
+        assert!((histogram.quantile(1.0).expect("durations") - 0.010).abs() < 1e-12);
+        histogram.record(Duration::from_secs(100));
+        assert_eq!(histogram.quantile(0.99), Some(f64::INFINITY));
+        assert!(histogram.quantile(0.5).expect("durations") < 0.010);
     }
 }
