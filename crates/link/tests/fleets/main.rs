@@ -13,6 +13,7 @@ mod namespaces;
 mod output;
 mod processes;
 mod relay;
+mod robot_soak;
 mod robots;
 mod soak;
 mod support;

@@ -162,7 +162,7 @@ impl ResourceMonitor {
 }
 
 /// Returns the memory that a process shares with no other, in kB.
-fn own_memory_kb(process: u32) -> Option<u64> {
+pub(crate) fn own_memory_kb(process: u32) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find(|line| line.starts_with("RssAnon:"))?;
     line.split_whitespace().nth(1)?.parse().ok()
@@ -239,7 +239,7 @@ fn fly(
     }
 }
 
-fn variable(name: &str) -> Option<u64> {
+pub(crate) fn variable(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 

@@ -16,18 +16,22 @@ const FLOOR: &str = "format = 1\nworld = \"robots\"\nname = \"floor\"\nseed = 6\
     [[robots]]\ncount = 3\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n";
 
 /// What a vehicle imports.
-const MODULES: &str = "numpy, rosbags.typesys, zenoh";
+pub(crate) const MODULES: &str = "numpy, rosbags.typesys, zenoh";
 
 /// A vehicle that is ended when it is dropped.
-struct Vehicle(Child);
+pub(crate) struct Vehicle(Child);
 
 impl Vehicle {
-    fn start(robot: u32, endpoint: &str, cycles: u32) -> Self {
+    pub(crate) fn start(robot: u32, endpoint: &str, cycles: u32) -> Self {
         let mut command = Command::new(python());
         command.arg(root().join("examples/vehicle.py"));
         command.args(["--robot", &robot.to_string(), "--connect", endpoint]);
         command.args(["--cycles", &cycles.to_string()]);
         Self(command.spawn().expect("Python starts"))
+    }
+
+    pub(crate) fn id(&self) -> u32 {
+        self.0.id()
     }
 
     /// Returns whether it has ended well.
@@ -43,10 +47,19 @@ impl Drop for Vehicle {
     }
 }
 
-/// Starts a fleet of which robot 2 has no node yet; returns it with the endpoint of its server.
+/// Starts a fleet of which the last one of three robots has no node yet; returns it with the endpoint of its server.
 fn fleet_without_the_last(folder: &Path, clock: ClockMode) -> (LinkProcess, FleetJob, String) {
+    fleet_without_the_last_of(folder, clock, 3)
+}
+
+/// Returns the same with a number of robots.
+pub(crate) fn fleet_without_the_last_of(
+    folder: &Path,
+    clock: ClockMode,
+    robots: u32,
+) -> (LinkProcess, FleetJob, String) {
     let job = FleetJob {
-        nodes: Some(2),
+        nodes: Some(robots as usize - 1),
         out: Some(folder.join("run")),
         ..job(folder, Topology::Star, clock)
     };
@@ -56,18 +69,18 @@ fn fleet_without_the_last(folder: &Path, clock: ClockMode) -> (LinkProcess, Flee
 }
 
 /// Returns the endpoint at which a program listens.
-fn listens(program: &LinkProcess) -> String {
+pub(crate) fn listens(program: &LinkProcess) -> String {
     program.until("it listens", |message| match message {
         LinkMessage::Listens(endpoints) => endpoints.into_iter().next(),
         _ => None,
     })
 }
 
-/// Returns the job of the node of robot 2, for a vehicle.
-fn vehicle_job(fleet: &FleetJob, server: &str, endpoint: &str) -> Job {
+/// Returns the job of the node of a robot, for a vehicle.
+pub(crate) fn vehicle_job(fleet: &FleetJob, server: &str, endpoint: &str, robot: u32) -> Job {
     let node = NodeJob {
         common: fleet.common.clone(),
-        agent: AgentName::new("robot", 2, None),
+        agent: AgentName::new("robot", robot, None),
         connect: vec![server.into()],
         listen: Vec::new(),
         patience_s: 60.0,
@@ -82,7 +95,7 @@ fn a_vehicle_in_python_joins_a_fleet_in_lockstep_and_decides_in_every_cycle() {
     }
     let folder = folder(FLOOR);
     let (fleet, job, server) = fleet_without_the_last(folder.path(), ClockMode::Lockstep);
-    let node = LinkProcess::start(&vehicle_job(&job, &server, "tcp/127.0.0.1:0"));
+    let node = LinkProcess::start(&vehicle_job(&job, &server, "tcp/127.0.0.1:0", 2));
     let vehicle = Vehicle::start(2, &listens(&node), 40);
     let (summary, status) = fleet.complete();
     assert_eq!(fleet.end(), (Some(0), None));
@@ -105,7 +118,7 @@ fn in_real_time_a_vehicle_that_is_gone_makes_its_robot_stand_and_another_one_tak
     // A fifth of a second for a cycle: a vehicle in Python on a busy machine decides within that, if not always.
     let clock = ClockMode::Realtime { speed: 5.0 };
     let (mut fleet, job, server) = fleet_without_the_last(folder.path(), clock);
-    let node = LinkProcess::start(&vehicle_job(&job, &server, "tcp/127.0.0.1:0"));
+    let node = LinkProcess::start(&vehicle_job(&job, &server, "tcp/127.0.0.1:0", 2));
     let endpoint = listens(&node);
     // As many decisions as it takes until ten of them were in time.
     let first = Vehicle::start(2, &endpoint, 1_000_000);
@@ -126,7 +139,7 @@ fn in_real_time_a_vehicle_that_is_gone_makes_its_robot_stand_and_another_one_tak
 fn an_endpoint_for_a_vehicle_that_others_reach_needs_insecure_and_other_worlds_have_none() {
     let folder = folder(FLOOR);
     let fleet = job(folder.path(), Topology::Star, ClockMode::Lockstep);
-    let open = vehicle_job(&fleet, "tcp/127.0.0.1:1", "tcp/0.0.0.0:7700");
+    let open = vehicle_job(&fleet, "tcp/127.0.0.1:1", "tcp/0.0.0.0:7700", 2);
     let said = crate::input::refused(&open);
     assert!(said.contains("--insecure"), "{said}");
     let ring = crate::processes::folder(&superconflict(3, "team", 5, ""));

@@ -6,7 +6,10 @@
 mod support;
 
 use serde_json::json;
+use sidestep::kernel::Seed;
+use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep_testing::has_modules;
+use std::time::{Duration, Instant};
 use support::{Hall, Plant, PlantTask, broker};
 
 /// Five robots that go to and fro around a block of shelves, past each other.
@@ -106,6 +109,54 @@ fn when_it_is_interrupted_the_orders_of_all_vehicles_are_canceled() {
     let vehicles = result["vehicles"].as_array().expect("vehicles");
     assert!(vehicles.iter().all(|vehicle| vehicle["canceled"].as_u64() >= Some(1)), "{result}");
     assert_eq!((&result["invalid"], &result["conflicts"]), (&json!([]), &json!([])));
+}
+
+/// `SIDESTEP_SOAK_S` is the number of seconds (60 if not set), `PROPTEST_RNG_SEED` the seed of the faults.
+#[test]
+#[ignore = "a minute, or as long as SIDESTEP_SOAK_S says: see .ci/soak"]
+fn vehicles_with_random_faults_carry_out_plan_after_plan() {
+    let Some(broker) = broker() else { return };
+    if !has_modules("paho.mqtt.client") {
+        return;
+    }
+    let variable = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    let lasts = Duration::from_secs(variable("SIDESTEP_SOAK_S").unwrap_or(60));
+    let seed = variable("PROPTEST_RNG_SEED").unwrap_or(1);
+    let streams = Streams::new(Seed(seed));
+    let began = Instant::now();
+    let mut orders = 0;
+    let mut plans = 0;
+    while began.elapsed() < lasts {
+        let hall = Hall::new(ROBOTS, 40);
+        // Each vehicle starts again, refuses or has no fault, by a draw.
+        let mut faults = json!({});
+        for vehicle in 0..5 {
+            let [kind, after, lost, _] = streams.block(vehicle, plans, Purpose(1), 0);
+            let after = 1 + after % 8;
+            let fault = match kind % 3 {
+                0 => json!({ "restart_after": after }),
+                1 => json!({ "refuse_after": after, "refuse_s": 0.1 * f64::from(lost % 30) }),
+                _ => json!({}),
+            };
+            faults[vehicle.to_string()] = fault;
+        }
+        let [lost, ..] = streams.block(5, plans, Purpose(1), 0);
+        let lost = 0.01 * f64::from(lost % 40);
+        let task = PlantTask { lost, edge_s: [0.03, 0.3], faults, forges: true };
+        let plant = Plant::start(&broker, &hall, &task);
+        let mut job = hall.job(&broker);
+        job.silence_s = 3.0;
+        job.resend_s = 1.0;
+        let ended = support::run(job);
+        let result = plant.stop();
+        assert_eq!(ended.code, 0, "seed {seed}, plan {plans}, {task:?}: {ended:?}");
+        hall.assert_carried_out(&result);
+        assert_eq!(result["invalid"], json!([]), "messages");
+        let status = ended.status.expect("a report");
+        orders += status.vehicles.iter().map(|vehicle| vehicle.orders).sum::<u64>();
+        plans += 1;
+    }
+    println!("seed {seed}: {plans} plans of five vehicles, {orders} orders");
 }
 
 #[test]

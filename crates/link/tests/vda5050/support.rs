@@ -166,6 +166,7 @@ impl Hall {
 }
 
 /// What vehicles are to do.
+#[derive(Debug)]
 pub(crate) struct PlantTask {
     /// Share of states that are lost.
     pub(crate) lost: f64,
