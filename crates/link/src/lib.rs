@@ -22,6 +22,7 @@
 //! ros2/              a run as a node of ROS 2, without ROS
 //! vda5050/           vehicles of a warehouse that carry out a plan (its broker.rs opens a socket, too)
 //! plant/             a real robot as its program sees it: measurements in, velocities out; by ROS 2
+//! mavlink/           an aircraft whose autopilot speaks MAVLink (its socket.rs opens sockets, too)
 //! drive/             the program of a robot that drives a plant
 //! program/           the process: its job, logs, metrics and child processes
 //! ```
@@ -35,6 +36,7 @@ pub mod drive;
 mod faults;
 pub mod hosted_run;
 pub mod identity;
+pub mod mavlink;
 pub mod messenger;
 pub mod node;
 pub mod peer;
