@@ -1,10 +1,10 @@
 //! Kinds of vehicles, their modes, and who is in control.
 
 use super::messages::CommandInt;
+use crate::plant::aircraft::Authority;
 use ::mavlink::dialects::common::{
     HEARTBEAT_DATA, MavAutopilot, MavLandedState, MavModeFlag, MavState, MavType,
 };
-use crate::plant::aircraft::Authority;
 
 /// The component of a vehicle that is its autopilot.
 pub(super) const AUTOPILOT_COMPONENT: u8 = 1;

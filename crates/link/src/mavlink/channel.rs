@@ -41,9 +41,8 @@ impl Channel {
         key: Option<[u8; KEY_BYTES]>,
         [system_id, component_id]: [u8; 2],
     ) -> Result<Self, String> {
-        let signing = key.map(|key| {
-            SigningData::from_config(SigningConfig::new(key, LINK_ID, true, false))
-        });
+        let signing =
+            key.map(|key| SigningData::from_config(SigningConfig::new(key, LINK_ID, true, false)));
         Ok(Self {
             socket: Socket::open(endpoint)?,
             splitter: Splitter::default(),

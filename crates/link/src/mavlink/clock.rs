@@ -25,7 +25,16 @@ pub(super) struct VehicleClock {
     newest: Option<Reading>,
     /// A measurement of another time, before a second one confirms it.
     doubtful: Option<Reading>,
-    round_trip_s: f64,
+    /// Since when all measurements are late, by this machine's clock in seconds; none if they are not.
+    late_since_s: Option<f64>,
+    round_trip: Option<RoundTrip>,
+}
+
+/// A question and its answer, in seconds by this machine's clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct RoundTrip {
+    asked_s: f64,
+    duration_s: f64,
 }
 
 /// A time of the vehicle, and when it arrived, in seconds.
@@ -53,7 +62,14 @@ pub(super) enum ClockUpdate {
 impl VehicleClock {
     /// Returns a clock that knows nothing yet.
     pub(super) fn new(start: Instant) -> Self {
-        Self { start, offset_s: 0.0, newest: None, doubtful: None, round_trip_s: 0.0 }
+        Self {
+            start,
+            offset_s: 0.0,
+            newest: None,
+            doubtful: None,
+            late_since_s: None,
+            round_trip: None,
+        }
     }
 
     /// Takes note of a measurement, by its time since the vehicle has booted. (That begins anew after 49 days, which
@@ -81,28 +97,48 @@ impl VehicleClock {
         if reading.boot_s <= newest.boot_s {
             return ClockUpdate::Old;
         }
+        if self.has_begun_anew(offset_s - self.offset_s, arrival_s) {
+            self.begin(reading);
+            return ClockUpdate::Rebooted;
+        }
         let drift_s = DRIFT * (arrival_s - newest.arrival_s);
         self.offset_s = offset_s.min(self.offset_s + drift_s);
         self.newest = Some(reading);
         ClockUpdate::Newer
     }
 
+    /// Returns whether measurements are later than a question and its answer took since they are late. Then they are not
+    /// late, but by another clock: one that has booted so early that it goes beyond what it was before.
+    fn has_begun_anew(&mut self, lateness_s: f64, arrival_s: f64) -> bool {
+        if lateness_s <= JUMP_S {
+            self.late_since_s = None;
+            return false;
+        }
+        let late_since_s = *self.late_since_s.get_or_insert(arrival_s);
+        self.round_trip.is_some_and(|round_trip| {
+            round_trip.asked_s >= late_since_s && lateness_s > round_trip.duration_s + JUMP_S
+        })
+    }
+
     fn begin(&mut self, reading: Reading) {
         self.offset_s = reading.arrival_s - reading.boot_s;
         self.newest = Some(reading);
         self.doubtful = None;
+        self.late_since_s = None;
     }
 
     /// Takes note of the time that a question and its answer took.
-    pub(super) fn set_round_trip(&mut self, round_trip: Duration) {
-        self.round_trip_s = round_trip.as_secs_f64();
+    pub(super) fn set_round_trip(&mut self, asked: Instant, duration: Duration) {
+        let asked_s = asked.saturating_duration_since(self.start).as_secs_f64();
+        self.round_trip = Some(RoundTrip { asked_s, duration_s: duration.as_secs_f64() });
     }
 
     /// Returns the age of the newest measurement in seconds.
     pub(super) fn age_s(&self, now: Instant) -> f64 {
         let Some(newest) = self.newest else { return f64::INFINITY };
         let now_s = now.duration_since(self.start).as_secs_f64();
-        now_s - newest.boot_s - self.offset_s + 0.5 * self.round_trip_s
+        let round_trip_s = self.round_trip.map_or(0.0, |round_trip| round_trip.duration_s);
+        now_s - newest.boot_s - self.offset_s + 0.5 * round_trip_s
     }
 }
 
@@ -153,7 +189,7 @@ mod tests {
         // One that was faster than the first makes all others older.
         assert_eq!(times.update(3000, 11.9), ClockUpdate::Newer);
         assert!((times.age_s(12.0) - 0.1).abs() < 1e-3);
-        times.clock.set_round_trip(Duration::from_millis(400));
+        times.clock.set_round_trip(times.at(12.0), Duration::from_millis(400));
         assert!((times.age_s(12.0) - 0.3).abs() < 1e-3);
     }
 
@@ -186,6 +222,21 @@ mod tests {
         assert_eq!(times.update(60_100, 10.1), ClockUpdate::Newer);
         assert_eq!(times.update(50_100, 10.15), ClockUpdate::Doubtful);
         assert_eq!(times.update(60_050, 10.2), ClockUpdate::Old);
+    }
+
+    #[test]
+    fn a_boot_soon_after_another_is_told_from_lateness_by_a_round_trip() {
+        let mut times = Times::new();
+        times.update(1000, 10.0);
+        // Whether five seconds are a boot or a delay, the first question since then tells.
+        times.clock.set_round_trip(times.at(10.0), Duration::from_millis(100));
+        assert_eq!(times.update(2000, 16.0), ClockUpdate::Newer);
+        assert!(times.age_s(16.0) > 4.9);
+        times.clock.set_round_trip(times.at(16.1), Duration::from_millis(4900));
+        assert_eq!(times.update(6000, 20.0), ClockUpdate::Newer);
+        times.clock.set_round_trip(times.at(21.0), Duration::from_millis(100));
+        assert_eq!(times.update(8000, 22.0), ClockUpdate::Rebooted);
+        assert!(times.age_s(22.0) < 0.1);
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! The scenario's coordinates and those of the earth.
 
 use sidestep::kernel::geodesy::is_latitude_rad;
+use sidestep::kernel::math::wrap_angle;
 use sidestep::worlds::airspace::flight::{Frame, Pose2, Surface, coordinates_from_degrees};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Units of latitude and longitude in a degree, as MAVLink counts them.
 const UNITS_PER_DEGREE: f64 = 1e7;
@@ -155,9 +157,14 @@ impl GeoPose {
     }
 }
 
-/// Returns the direction clockwise from the north of one counterclockwise from the east, or the other way round.
+/// Returns the direction clockwise from the north of one counterclockwise from the east, in [0, 2 pi).
 pub(super) fn compass_rad(heading_rad: f64) -> f64 {
-    (std::f64::consts::FRAC_PI_2 - heading_rad).rem_euclid(std::f64::consts::TAU)
+    (FRAC_PI_2 - heading_rad).rem_euclid(TAU)
+}
+
+/// Returns the direction counterclockwise from the east of one clockwise from the north, within half a turn.
+pub(super) fn heading_rad(compass_rad: f64) -> f64 {
+    wrap_angle(FRAC_PI_2 - compass_rad)
 }
 
 /// Returns longitude and latitude in radians of a latitude and a longitude in 1e-7 degrees; none if they are no place.
@@ -174,7 +181,6 @@ pub(super) fn place_of_units([latitude, longitude]: [i32; 2]) -> Option<[f64; 2]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::FRAC_PI_2;
 
     #[test]
     fn an_origin_has_two_or_three_numbers_of_a_place() {
@@ -182,9 +188,12 @@ mod tests {
         assert_eq!(Origin::parse("47.4, -8.5"), Ok(origin));
         let high = Origin { altitude_m: Some(488.0), ..origin };
         assert_eq!(Origin::parse("47.4,-8.5,488"), Ok(high));
-        for (text, cause) in
-            [("47.4", "1 numbers"), ("a,b", "no number"), ("91,0", "no place"), ("1,2,3,4", "4 numbers")]
-        {
+        for (text, cause) in [
+            ("47.4", "1 numbers"),
+            ("a,b", "no number"),
+            ("91,0", "no place"),
+            ("1,2,3,4", "4 numbers"),
+        ] {
             let error = Origin::parse(text).expect_err(text);
             assert!(error.contains(cause), "{text}: {error}");
         }
@@ -222,5 +231,7 @@ mod tests {
         assert_eq!(compass_rad(FRAC_PI_2), 0.0);
         assert_eq!(compass_rad(0.0), FRAC_PI_2);
         assert_eq!(compass_rad(-FRAC_PI_2), 2.0 * FRAC_PI_2);
+        assert_eq!(heading_rad(FRAC_PI_2), 0.0);
+        assert_eq!(heading_rad(4.0 * FRAC_PI_2), FRAC_PI_2);
     }
 }

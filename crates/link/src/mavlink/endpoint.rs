@@ -74,7 +74,8 @@ impl MavlinkEndpoint {
     /// When the host is not known.
     pub(super) fn resolve(&self) -> Result<SocketAddr, String> {
         let found = (self.host.as_str(), self.port).to_socket_addrs();
-        let mut addresses = found.map_err(|error| format!("{} is not known ({error})", self.host))?;
+        let mut addresses =
+            found.map_err(|error| format!("{} is not known ({error})", self.host))?;
         addresses.next().ok_or_else(|| format!("{} has no address", self.host))
     }
 }

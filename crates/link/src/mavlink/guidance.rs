@@ -9,15 +9,14 @@
 //! they are abeam of it, ahead by the time that their course takes, and toward it by the angle to a point ahead on it.
 //! What they are behind on it they catch up by their airspeed, whose integral is what the wind takes.
 
-use super::autopilot::{
-    CHANGE_ALTITUDE, CHANGE_HEADING, GLOBAL_FRAME, HOME_FRAME, Identity,
-};
+use super::autopilot::{CHANGE_ALTITUDE, CHANGE_HEADING, GLOBAL_FRAME, HOME_FRAME, Identity};
 use super::commands::CommandMessage;
 use super::coordinates::{AltitudeTarget, GeoPose, compass_rad};
 use super::measured::Fix;
 use super::messages::CommandInt;
 use ::mavlink::dialects::common::{
-    COMMAND_LONG_DATA, MavCmd, MavFrame, PositionTargetTypemask, SET_POSITION_TARGET_GLOBAL_INT_DATA,
+    COMMAND_LONG_DATA, MavCmd, MavFrame, PositionTargetTypemask,
+    SET_POSITION_TARGET_GLOBAL_INT_DATA,
 };
 use sidestep::kernel::math::{atan2, cos, hypot, sin, wrap_angle};
 use sidestep::worlds::airspace::flight::{Pose2, Surface};
@@ -32,21 +31,23 @@ const REACH_S: f64 = 1.0;
 const CROSS_TIME_S: f64 = 4.0;
 
 /// Time that the course of a fixed wing takes, in seconds.
-const COURSE_TIME_S: f64 = 1.0;
+const COURSE_TIME_S: f64 = 1.3;
 
 /// Time in which a fixed wing catches up along its reference, in seconds, and the largest part of the speed for it.
-const ALONG_TIME_S: f64 = 5.0;
+const ALONG_TIME_S: f64 = 4.0;
 const MAX_CATCH_UP: f64 = 0.15;
 
-/// Change of the airspeed in a second for each meter per second that the ground speed is wrong.
-const AIRSPEED_GAIN: f64 = 0.4;
+/// Airspeed for each meter per second that the ground speed is wrong, and its change in a second: fast enough that in a turn
+/// of a minute the wind, which changes by twice its speed, is followed.
+const AIRSPEED_GAIN: f64 = 1.0;
+const AIRSPEED_GAIN_PER_S: f64 = 0.5;
 
 /// The longest time over which the airspeed is integrated at once, in seconds.
 const MAX_STEP_S: f64 = 0.5;
 
 /// Commands to a fixed wing: each is acknowledged, so their number is bounded.
 const COURSE_INTERVAL: Duration = Duration::from_millis(240);
-const AIRSPEED_INTERVAL: Duration = Duration::from_millis(990);
+const AIRSPEED_INTERVAL: Duration = Duration::from_millis(490);
 const ALTITUDE_INTERVAL: Duration = Duration::from_secs(4);
 
 /// Changes that are not worth a command, in meters per second and in meters.
@@ -62,6 +63,13 @@ pub struct FlightLimits {
     pub min_airspeed_m_s: f64,
     /// In meters per second squared, in the plane: turns and changes of speed.
     pub max_acceleration_m_s2: f64,
+}
+
+impl FlightLimits {
+    /// Returns the airspeed within the limits that is nearest to one.
+    fn airspeed_m_s(&self, wanted_m_s: f64) -> f64 {
+        wanted_m_s.max(self.min_airspeed_m_s).min(self.max_speed_m_s)
+    }
 }
 
 /// A reference on the earth.
@@ -277,11 +285,10 @@ impl Guidance {
         let since_s = self.integrated_at.map_or(0.0, |at| now.duration_since(at).as_secs_f64());
         self.integrated_at = Some(now);
         let before_m_s = self.airspeed_m_s.unwrap_or(speed_m_s);
-        let step_m_s = AIRSPEED_GAIN * error_m_s * since_s.min(MAX_STEP_S);
-        let limits = &self.limits;
-        let airspeed_m_s =
-            (before_m_s + step_m_s).max(limits.min_airspeed_m_s).min(limits.max_speed_m_s);
-        self.airspeed_m_s = Some(airspeed_m_s);
+        let step_m_s = AIRSPEED_GAIN_PER_S * error_m_s * since_s.min(MAX_STEP_S);
+        let steady_m_s = self.limits.airspeed_m_s(before_m_s + step_m_s);
+        self.airspeed_m_s = Some(steady_m_s);
+        let airspeed_m_s = self.limits.airspeed_m_s(steady_m_s + AIRSPEED_GAIN * error_m_s);
         let is_known = self.airspeed.is_some_and(|told| {
             let is_same = (told.value - airspeed_m_s).abs() < MIN_AIRSPEED_CHANGE_M_S;
             is_same || now.duration_since(told.at) < AIRSPEED_INTERVAL
@@ -312,7 +319,8 @@ impl Guidance {
         let is_told = self.altitude.is_some_and(|told| {
             told.value == setpoint.altitude && told.at.elapsed() < ALTITUDE_INTERVAL
         });
-        if is_told || (is_near && self.altitude.is_some_and(|told| told.value == setpoint.altitude)) {
+        if is_told || (is_near && self.altitude.is_some_and(|told| told.value == setpoint.altitude))
+        {
             return None;
         }
         self.altitude = Some(Told { value: setpoint.altitude, at: Instant::now() });

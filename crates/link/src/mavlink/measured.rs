@@ -2,7 +2,7 @@
 
 use super::autopilot::Identity;
 use super::clock::{ClockUpdate, VehicleClock};
-use super::coordinates::{GeoFrame, GeoPose, VehicleAltitude, compass_rad, place_of_units};
+use super::coordinates::{GeoFrame, GeoPose, VehicleAltitude, heading_rad, place_of_units};
 use super::counts::MavlinkCounts;
 use crate::plant::aircraft::{AircraftState, Authority};
 use ::mavlink::dialects::common::{GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavLandedState};
@@ -54,7 +54,7 @@ impl Fix {
         // North comes first in MAVLink, and centimeters.
         let velocity_m_s = [content.vy, content.vx].map(|cm_s| f64::from(cm_s) / 100.0);
         let nose_rad = (content.hdg != UNKNOWN_HEADING)
-            .then(|| compass_rad((f64::from(content.hdg) / 100.0).to_radians()));
+            .then(|| heading_rad((f64::from(content.hdg) / 100.0).to_radians()));
         Some(Self { at, altitude, velocity_m_s, nose_rad })
     }
 
@@ -98,7 +98,7 @@ impl Measured {
 
     /// Takes note of the yaw of the nose, in radians clockwise from the north.
     pub(super) fn on_yaw(&mut self, yaw_rad: f64) {
-        self.yaw_rad = yaw_rad.is_finite().then(|| compass_rad(yaw_rad));
+        self.yaw_rad = yaw_rad.is_finite().then(|| heading_rad(yaw_rad));
     }
 
     /// Takes note of a position. Returns whether it is used, and whether the vehicle has booted before it.
@@ -165,8 +165,8 @@ impl Measured {
         let track_rad = atan2(north, east);
         let nose_rad = self.yaw_rad.or(fix.nose_rad).unwrap_or(track_rad);
         let is_moving = fix.ground_speed_m_s() >= MIN_TRACK_SPEED_M_S;
-        let heading_rad = if is_moving { track_rad } else { nose_rad };
-        Some(GeoPose { at: fix.at, heading_rad })
+        let direction_rad = if is_moving { track_rad } else { nose_rad };
+        Some(GeoPose { at: fix.at, heading_rad: direction_rad })
     }
 
     /// Returns the state in the scenario's coordinates; none before the first position.

@@ -163,7 +163,10 @@ mod tests {
             let mut payload = [0; 255];
             let length = ack.ser(MavlinkVersion::V2, &mut payload);
             assert_eq!(length, if target == [0, 0] { 3 } else { 10 });
-            assert_eq!(CommandAck::deser(MavlinkVersion::V2, &payload[..length]).expect("whole"), ack);
+            assert_eq!(
+                CommandAck::deser(MavlinkVersion::V2, &payload[..length]).expect("whole"),
+                ack
+            );
         }
     }
 }

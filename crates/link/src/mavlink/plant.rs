@@ -36,6 +36,8 @@ const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
 /// The longest round trip that is one, and no answer to another question.
 const MAX_ROUND_TRIP: Duration = Duration::from_secs(5);
 
+const MAX_ROUND_TRIP_NS: i64 = 5_000_000_000;
+
 /// Time after the first heartbeat in which others are waited for: each system has sent one by then.
 const SURVEY_TIME: Duration = Duration::from_millis(1500);
 
@@ -188,7 +190,12 @@ impl MavlinkPlant {
         }
         let found = Survey::new(options).search(&mut channel, may_wait)?;
         let identity = Identity::new(found.0, &found.1).map_err(MavlinkError::Unsupported)?;
-        tracing::info!("system {} is {:?}, {:?}", identity.system, identity.firmware, identity.kind);
+        tracing::info!(
+            "system {} is {:?}, {:?}",
+            identity.system,
+            identity.firmware,
+            identity.kind
+        );
         let now = Instant::now();
         let schedule = Schedule {
             start: now,
@@ -433,12 +440,13 @@ impl MavlinkPlant {
             // A question of the vehicle: it needs no time of ours.
             return;
         }
-        let is_latest = answer.ts1 == self.schedule.asked_ns;
-        let asked = u64::try_from(answer.ts1).ok().filter(|_| is_latest);
+        // Answers may take longer than the time between questions.
+        let is_ours = answer.ts1 <= self.schedule.asked_ns
+            && self.schedule.asked_ns - answer.ts1.max(0) <= MAX_ROUND_TRIP_NS;
+        let asked = u64::try_from(answer.ts1).ok().filter(|_| is_ours);
         let Some(asked_ns) = asked else { return };
-        let elapsed = self.schedule.start.elapsed();
-        let round_trip = elapsed.saturating_sub(Duration::from_nanos(asked_ns));
-        self.measured.clock.set_round_trip(round_trip.min(MAX_ROUND_TRIP));
+        let asked = self.schedule.start + Duration::from_nanos(asked_ns);
+        self.measured.clock.set_round_trip(asked, asked.elapsed().min(MAX_ROUND_TRIP));
     }
 
     fn on_text(&mut self, raw: &MAVLinkV2MessageRaw) {
@@ -795,7 +803,10 @@ impl<'a> Survey<'a> {
             return format!("; {} frames had no signature", counts.unsigned);
         }
         if counts.badly_signed > 0 {
-            return format!("; the signatures of {} frames are of another key, or old", counts.badly_signed);
+            return format!(
+                "; the signatures of {} frames are of another key, or old",
+                counts.badly_signed
+            );
         }
         if counts.version_1 > 0 {
             return format!("; {} frames were of version 1 of MAVLink", counts.version_1);

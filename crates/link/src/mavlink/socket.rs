@@ -113,9 +113,7 @@ impl Socket {
     /// Sends a frame. Returns whether it could be sent.
     pub(super) fn send(&mut self, frame: &[u8]) -> bool {
         match self {
-            Self::Udp(udp) => {
-                udp.peer.is_some_and(|peer| udp.socket.send_to(frame, peer).is_ok())
-            }
+            Self::Udp(udp) => udp.peer.is_some_and(|peer| udp.socket.send_to(frame, peer).is_ok()),
             Self::Tcp(tcp) => tcp.send(frame),
         }
     }
@@ -196,7 +194,9 @@ impl TcpPeer {
         let is_set = stream.set_read_timeout(Some(within.max(MIN_WAIT))).is_ok();
         match stream.read(buffer) {
             Ok(bytes) if bytes > 0 && is_set => Arrival::Stream(bytes),
-            Err(error) if is_passing(error.kind()) && error.kind() != ErrorKind::ConnectionReset => {
+            Err(error)
+                if is_passing(error.kind()) && error.kind() != ErrorKind::ConnectionReset =>
+            {
                 Arrival::Nothing
             }
             // The other end has closed it, or it broke.

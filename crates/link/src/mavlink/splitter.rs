@@ -104,7 +104,8 @@ fn piece(bytes: &[u8]) -> Piece {
             if flags & !v2::IFLAG_SIGNED != 0 {
                 return Piece::Nothing;
             }
-            let signature_bytes = if flags & v2::IFLAG_SIGNED == 0 { 0 } else { v2::SIGNATURE_SIZE };
+            let signature_bytes =
+                if flags & v2::IFLAG_SIGNED == 0 { 0 } else { v2::SIGNATURE_SIZE };
             let length = VERSION_2_BYTES + content_bytes + signature_bytes;
             if bytes.len() < length { Piece::Incomplete } else { Piece::Frame(length) }
         }
@@ -138,7 +139,8 @@ mod tests {
     fn heartbeat(sequence: u8) -> Vec<u8> {
         let header = MavHeader { system_id: 1, component_id: 1, sequence };
         let mut raw = MAVLinkV2MessageRaw::new();
-        let content = HEARTBEAT_DATA { custom_mode: 4, mavlink_version: 3, ..HEARTBEAT_DATA::DEFAULT };
+        let content =
+            HEARTBEAT_DATA { custom_mode: 4, mavlink_version: 3, ..HEARTBEAT_DATA::DEFAULT };
         raw.serialize_message_data(header, &content);
         raw.raw_bytes().to_vec()
     }
@@ -156,7 +158,8 @@ mod tests {
 
     #[test]
     fn frames_are_found_wherever_a_stream_is_cut() {
-        let stream = [heartbeat(1), vec![MAV_STX, 1, 0, 9, 9, 0, 5, 1, 2], heartbeat(2), attitude()];
+        let stream =
+            [heartbeat(1), vec![MAV_STX, 1, 0, 9, 9, 0, 5, 1, 2], heartbeat(2), attitude()];
         let stream = stream.concat();
         for cut in 0..stream.len() {
             let mut splitter = Splitter::default();

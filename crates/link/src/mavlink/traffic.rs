@@ -1,6 +1,8 @@
 //! Other aircraft, told and heard, as receivers of ADS-B report them.
 
-use super::coordinates::{AltitudeTarget, GeoFrame, GeoPose, VehicleAltitude, compass_rad, place_of_units};
+use super::coordinates::{
+    AltitudeTarget, GeoFrame, GeoPose, VehicleAltitude, heading_rad, place_of_units,
+};
 use super::counts::MavlinkCounts;
 use crate::plant::aircraft::TrafficReport;
 use ::mavlink::dialects::common::{
@@ -135,7 +137,7 @@ fn report_of(message: &ADSB_VEHICLE_DATA, frame: TrafficFrame) -> Option<Traffic
         return None;
     }
     let at = place_of_units([message.lat, message.lon])?;
-    let heading_rad = compass_rad((f64::from(message.heading) / 100.0).to_radians());
+    let heading_rad = heading_rad((f64::from(message.heading) / 100.0).to_radians());
     let sea_m = f64::from(message.altitude) / 1000.0;
     // Above a home that is not known there is no altitude.
     let home_m = sea_m - frame.home_m?;
@@ -171,7 +173,10 @@ mod tests {
     #[test]
     fn a_report_has_the_units_of_adsb_and_comes_back() {
         let message = Traffic::default().tell(&report(0x00F0_0003), frame()).expect("told");
-        assert_eq!((message.altitude, message.heading, message.hor_velocity), (608_000, 9000, 1234));
+        assert_eq!(
+            (message.altitude, message.heading, message.hor_velocity),
+            (608_000, 9000, 1234)
+        );
         assert_eq!(message.callsign.to_str().expect("text"), "SSF00003");
         let mut other = Traffic::default();
         let mut counts = MavlinkCounts::default();

@@ -51,7 +51,8 @@ fn vehicles_of_each_kind_follow_lines_and_circles_in_the_wind() {
     if !has_modules(PEER) {
         return;
     }
-    let common = json!({ "kind": "plane", "autopilot": "ardupilot", "wind": [3, -2], "noise": 0.3 });
+    let common =
+        json!({ "kind": "plane", "autopilot": "ardupilot", "wind": [3, -2], "noise": 0.3 });
     let vehicle = |fields: Value| {
         let mut vehicle = common.clone();
         let more = fields.as_object().expect("fields").clone();
@@ -59,7 +60,9 @@ fn vehicles_of_each_kind_follow_lines_and_circles_in_the_wind() {
         vehicle
     };
     let mut vehicles = Vehicles::start(&json!([
-        vehicle(json!({ "system": 1, "kind": "copter", "start": [0, 0, ALTITUDE_M, 90], "speed": 8 })),
+        vehicle(
+            json!({ "system": 1, "kind": "copter", "start": [0, 0, ALTITUDE_M, 90], "speed": 8 })
+        ),
         vehicle(json!({ "system": 2, "kind": "copter", "start": [0, 500, ALTITUDE_M, 90],
                         "autopilot": "px4", "mode": AUTO_LOITER })),
         vehicle(json!({ "system": 3, "start": [0, 1000, ALTITUDE_M, 90], "speed": 15 })),
@@ -98,12 +101,15 @@ fn vehicles_of_each_kind_follow_lines_and_circles_in_the_wind() {
     }
     let copter = vehicles.report(0);
     // Nothing is left out, altitudes are above the home, and heartbeats are sent all the time.
-    assert_eq!((&copter["setpoint"]["type_mask"], &copter["setpoint"]["coordinate_frame"]), (&json!(0), &json!(6)));
+    assert_eq!(
+        (&copter["setpoint"]["type_mask"], &copter["setpoint"]["coordinate_frame"]),
+        (&json!(0), &json!(6))
+    );
     assert!(copter["told"]["heartbeats"].as_u64().expect("a count") >= 15, "{copter}");
     let plane = vehicles.report(2);
-    // Four courses and one speed in a second at most.
+    // Four courses and two speeds in a second at most.
     assert!(plane["told"]["courses"].as_u64().expect("a count") <= 110, "{plane}");
-    assert!(plane["told"]["commands"]["178"].as_u64().expect("a count") <= 27, "{plane}");
+    assert!(plane["told"]["commands"]["178"].as_u64().expect("a count") <= 55, "{plane}");
 }
 
 /// Stays where it is.
@@ -254,7 +260,7 @@ fn measurements_that_stop_stand_still_or_come_late_are_old() {
     vehicles.set(&json!({ "silent": true }));
     let silent = wait_for(&mut plant, "silence", |state| state.authority == Authority::Vehicle);
     assert!(silent.age_s > 2.0, "{silent:?}");
-    assert_eq!(count(&plant, "silences"), 1);
+    wait_for_count(&mut plant, "silences", 1);
     vehicles.set(&json!({ "silent": false }));
     wait_for(&mut plant, "its node's control", |state| {
         state.authority == Authority::Node && state.age_s < 0.3
@@ -269,8 +275,6 @@ fn a_vehicle_that_boots_in_the_air_is_told_and_asked_again_for_its_messages() {
     let mut vehicles = Vehicles::start(&json!([copter()]));
     let mut plant = vehicles.plant(0);
     wait_for(&mut plant, "a fresh position", |state| state.age_s < 0.3);
-    // Long enough for its clock to have gone on.
-    std::thread::sleep(Duration::from_millis(1500));
     let before = vehicles.report(0)["told"]["commands"]["511"].as_u64().expect("a count");
     assert_eq!(vehicles.ask(&json!({ "do": "reboot", "seconds": 4 })), "done");
     wait_for(&mut plant, "silence", |state| state.age_s > 2.5);
@@ -290,7 +294,7 @@ fn frames_are_signed_and_those_of_another_key_have_no_effect() {
     }
     let mut signed = copter();
     signed["key"] = "0a".repeat(32).into();
-    let mut vehicles = Vehicles::start(&json!([signed, copter()]));
+    let mut vehicles = Vehicles::start(&json!([signed, signed, copter()]));
     let with_key = |vehicle: usize, key: u8, patience: Duration| {
         let options = options(vehicles.ports[vehicle]);
         MavlinkPlant::connect(&MavlinkOptions { key: Some([key; 32]), patience, ..options })
@@ -299,16 +303,15 @@ fn frames_are_signed_and_those_of_another_key_have_no_effect() {
     wait_for(&mut plant, "a signed position", |state| state.authority == Authority::Node);
     plant.hold("a test").expect("it holds by signed commands");
     assert_eq!(count(&plant, "badly_signed"), 0);
-    // One that is not signed is dropped among those that are.
-    let foreign = json!({ "do": "foreign" });
     let patience = Duration::from_secs(4);
-    let other = with_key(0, 11, patience).err().expect("another key").to_string();
+    let other = with_key(1, 11, patience).err().expect("another key").to_string();
     assert!(other.contains("another key"), "{other}");
-    let bare = with_key(1, 10, patience).err().expect("no key").to_string();
+    let bare = with_key(2, 10, patience).err().expect("no key").to_string();
     assert!(bare.contains("no signature"), "{bare}");
-    assert_eq!(vehicles.ask(&foreign), "done");
+    // What is not signed is dropped among what is.
+    assert_eq!(vehicles.ask(&json!({ "do": "foreign" })), "done");
     wait_for_count(&mut plant, "unsigned", 2);
-    let report = vehicles.report(0);
+    let report = vehicles.report(1);
     assert!(report["told"]["bad"].as_u64().expect("a count") > 0, "{report}");
 }
 
@@ -333,11 +336,8 @@ fn what_others_send_is_dropped_and_counted() {
     let options = MavlinkOptions { endpoint, ..options(port) };
     let several = MavlinkPlant::connect(&options).err().expect("two vehicles");
     assert_eq!(several, MavlinkError::Several(vec![1, 2]));
-    let third = MavlinkOptions {
-        system_id: Some(3),
-        patience: Duration::from_secs(2),
-        ..options.clone()
-    };
+    let third =
+        MavlinkOptions { system_id: Some(3), patience: Duration::from_secs(2), ..options.clone() };
     let third = MavlinkPlant::connect(&third).err().expect("no such vehicle").to_string();
     assert!(third.contains("system 3") && third.contains("[1, 2]"), "{third}");
     let options = MavlinkOptions { system_id: Some(2), ..options };
@@ -388,7 +388,8 @@ fn traffic_is_shown_to_the_vehicle_and_taken_from_its_receiver() {
     let north = shown["lat"].as_f64().expect("units") * 1e-7 - vehicles::ORIGIN.latitude_deg;
     assert!((north - 0.003_598).abs() < 2e-6, "{north}");
     assert!(plant.take_traffic().is_empty(), "it is no news");
-    let fields = json!([0x4B_1805, 474_000_000, 85_500_000, 1, 700_000, 9000, 5000, 0, 1, 0, 31, 1200]);
+    let fields =
+        json!([0x4B_1805, 474_000_000, 85_500_000, 1, 700_000, 9000, 5000, 0, 1, 0, 31, 1200]);
     assert_eq!(vehicles.ask(&json!({ "do": "adsb", "fields": fields })), "done");
     let until = Instant::now() + TEST_TIMEOUT;
     let mut heard = Vec::new();
@@ -404,11 +405,7 @@ fn traffic_is_shown_to_the_vehicle_and_taken_from_its_receiver() {
 #[test]
 fn whoever_could_be_reached_by_others_needs_a_key_or_has_to_say_that_it_goes_without() {
     let endpoint = MavlinkEndpoint::parse("udpout:192.0.2.1:14550").expect("an endpoint");
-    let outside = MavlinkOptions {
-        endpoint,
-        patience: Duration::from_millis(10),
-        ..options(1)
-    };
+    let outside = MavlinkOptions { endpoint, patience: Duration::from_millis(10), ..options(1) };
     let error = MavlinkPlant::connect(&outside).err().expect("it is not signed");
     assert!(matches!(error, MavlinkError::Insecure(_)), "{error}");
     let insecure = MavlinkOptions { is_insecure: true, ..outside.clone() };

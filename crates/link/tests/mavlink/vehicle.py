@@ -309,11 +309,11 @@ class Vehicle:
                 return
             if time.monotonic() < self.speaks_at:
                 continue
+            self.peer = source
             for message in self.link.parse_buffer(data) or []:
                 if message.get_type() == "BAD_DATA":
                     self.told["bad"] += 1
                     continue
-                self.peer = self.peer or source
                 self.on_message(message)
 
     def on_message(self, message):
@@ -467,7 +467,8 @@ class Airspace:
         if what == "reboot":
             vehicle.reboot(request["seconds"])
         elif what == "adsb":
-            vehicle.send(mavlink.MAVLink_adsb_vehicle_message(*request["fields"][:7], b"TEST", *request["fields"][7:]))
+            fields = request["fields"]
+            vehicle.send(mavlink.MAVLink_adsb_vehicle_message(*fields[:8], b"TEST", *fields[8:]))
         elif what == "foreign":
             vehicle.foreign()
         elif what == "set":
