@@ -113,7 +113,8 @@ mod tests {
 
     #[test]
     fn what_is_no_area_is_refused_by_what_is_wrong() {
-        let refused = |settings: FenceSettings| Fence::new(&settings, Surface::Plane).expect_err("refused");
+        let refused =
+            |settings: FenceSettings| Fence::new(&settings, Surface::Plane).expect_err("refused");
         let polygon = vec![[0.0, 0.0], [1.0, 0.0]];
         let circle = Some(([0.0, 0.0], 0.0));
         let altitude_m = Some([5.0, 5.0]);

@@ -28,6 +28,6 @@ pub mod guard;
 pub mod message;
 pub mod node;
 pub mod recorder;
-pub mod time;
 #[cfg(test)]
 mod tests;
+pub mod time;

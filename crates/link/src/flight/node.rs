@@ -285,8 +285,10 @@ impl<'a> FlightNode<'a> {
         }
         let GuardReport { is_at_reference, deviation_m, .. } = self.parts.board.guard();
         if !is_at_reference {
-            let place = deviation_m.map_or("unknown".to_string(), |it_m| format!("{it_m:.1} m off"));
-            let reason = format!("the vehicle is not at its start, or not led by its node: {place}");
+            let place =
+                deviation_m.map_or("unknown".to_string(), |it_m| format!("{it_m:.1} m off"));
+            let reason =
+                format!("the vehicle is not at its start, or not led by its node: {place}");
             return Err(FlightError::NotAllThere(reason));
         }
         Ok(())

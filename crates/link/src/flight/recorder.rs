@@ -136,9 +136,10 @@ impl<'a> FlightRecorder<'a> {
     /// Sets the start once all are ready, and says it until cycle 0 has begun.
     fn set_start_if_ready(&mut self) {
         let now_s = self.clock.now_s();
-        let are_ready = self.nodes.iter().all(|node| {
-            node.presence.as_ref().is_some_and(|presence| presence.is_ready)
-        });
+        let are_ready = self
+            .nodes
+            .iter()
+            .all(|node| node.presence.as_ref().is_some_and(|presence| presence.is_ready));
         if self.sets_start && are_ready {
             self.sets_start = false;
             // The cycle before the first one decides that.

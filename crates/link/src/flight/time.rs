@@ -121,7 +121,9 @@ mod tests {
         assert!(ahead.is_beyond(0.1) && !ahead.is_beyond(0.6));
         let mut broken = ClockDifference::default();
         (0..4).for_each(|_| broken.add(f64::NAN, 99.5));
-        assert!(broken.behind_s().is_none_or(|behind_s| !behind_s.is_finite()) || broken.is_beyond(1.0));
+        assert!(
+            broken.behind_s().is_none_or(|behind_s| !behind_s.is_finite()) || broken.is_beyond(1.0)
+        );
     }
 
     #[test]

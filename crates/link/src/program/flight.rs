@@ -112,10 +112,8 @@ pub(super) fn run(job: &FlightJob, parent: &ParentMonitor) -> Result<(), Error> 
     let limits = guard_limits(job, world, agent)?;
     let plant = open_plant(job, world, agent)?;
     let listen = listen_endpoints(&job.network.listen)?;
-    let options = PeerOptions {
-        is_scouting: job.network.is_scouting,
-        credentials: credentials.as_ref(),
-    };
+    let options =
+        PeerOptions { is_scouting: job.network.is_scouting, credentials: credentials.as_ref() };
     let me = PeerId::Node(agent);
     let wire = ZenohWire::peer_wire(me, &listen, &job.network.peers, options);
     let wire = wire.map_err(endpoint_error)?;
@@ -241,8 +239,10 @@ fn max_deviation_m(
     }
     let given_m = job.guard.max_deviation_m.unwrap_or(allowed_m);
     if given_m > allowed_m {
-        let cause = format!("{given_m} m is more than the {allowed_m:.1} m for which the shield allows");
-        let remedy = "give a smaller --max-deviation, or the airplanes a larger error of position (nic)";
+        let cause =
+            format!("{given_m} m is more than the {allowed_m:.1} m for which the shield allows");
+        let remedy =
+            "give a smaller --max-deviation, or the airplanes a larger error of position (nic)";
         return Err(InputError::new("--max-deviation", cause, remedy));
     }
     Ok(given_m)

@@ -57,10 +57,8 @@ pub(super) fn run(job: &FlightRecorderJob, parent: &ParentMonitor) -> Result<(),
     let jobs = node_jobs(job, &nodes, world.as_ref());
     let children = NodeProcesses::start(jobs, true)?;
     let peers: Vec<String> = nodes.into_iter().chain(job.network.peers.iter().cloned()).collect();
-    let options = PeerOptions {
-        is_scouting: job.network.is_scouting,
-        credentials: credentials.as_ref(),
-    };
+    let options =
+        PeerOptions { is_scouting: job.network.is_scouting, credentials: credentials.as_ref() };
     let wire = ZenohWire::peer_wire(PeerId::Server, &listen, &peers, options);
     let wire = wire.map_err(endpoint_error)?;
     print_message(&LinkMessage::Listens(listen));
@@ -160,7 +158,8 @@ impl RecorderHooks for FlightSupervisor<'_> {
         })?;
         // One that ends before the start would end again: its job is wrong.
         if let Some((agent, reason)) = ended.first().filter(|_| start_s.is_none()) {
-            let cause = format!("the node of airplane {agent} has ended before the start: {reason}");
+            let cause =
+                format!("the node of airplane {agent} has ended before the start: {reason}");
             return Err(Error::other(cause, "start the flight again; --log info tells more"));
         }
         for (agent, reason) in ended {

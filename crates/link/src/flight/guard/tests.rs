@@ -92,8 +92,7 @@ fn guard(at_s: f64, limits: GuardLimits) -> GuardTest {
     board.put_reference(vec![ReferenceCycle { cycle: 0, points, is_last: true }]);
     let told = Arc::new(Mutex::new(Told::default()));
     let state = Arc::new(Mutex::new(Some(state_at([1.0, 0.0]))));
-    let plant =
-        FakeAircraft { told: Arc::clone(&told), state: Arc::clone(&state), refusals: 0 };
+    let plant = FakeAircraft { told: Arc::clone(&told), state: Arc::clone(&state), refusals: 0 };
     let guard = Guard::new(Box::new(plant), Arc::clone(&board), clock, limits);
     GuardTest { guard, board, told, state }
 }
@@ -188,11 +187,8 @@ fn an_aircraft_that_somebody_else_flies_is_told_nothing() {
 #[test]
 fn an_aircraft_that_refuses_is_asked_again() {
     let mut test = guard(10.0, limits(&FenceSettings::default()));
-    let plant = FakeAircraft {
-        told: Arc::clone(&test.told),
-        state: Arc::clone(&test.state),
-        refusals: 1,
-    };
+    let plant =
+        FakeAircraft { told: Arc::clone(&test.told), state: Arc::clone(&test.state), refusals: 1 };
     test.guard.plant = Box::new(plant);
     test.step_with(None);
     assert!(test.guard.hold_again.is_some());

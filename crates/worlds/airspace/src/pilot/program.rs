@@ -26,10 +26,10 @@ use crate::settings::Grouping;
 use crate::shield::PlanCertainty;
 use crate::world::AirspaceWorld;
 use cycle_state::{ConversationMismatch, PilotCyclePhase, PilotCycleState};
-use sidestep_kernel::{Cycle, EntityId};
 use sidestep_kernel::network::{
     DropCounts, DropReason, NetworkAgent, OutgoingPacket, PacketOutbox, digest_pieces, parse_packet,
 };
+use sidestep_kernel::{Cycle, EntityId};
 use std::collections::VecDeque;
 use std::sync::Arc;
 

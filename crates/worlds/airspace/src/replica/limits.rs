@@ -66,7 +66,8 @@ fn check_decisions(world: &AirspaceWorld) -> Result<(), FlightLimit> {
         return limit(cause, "add --set airspace.groups=heard");
     }
     if !world.shield {
-        let cause = "the shield is off, and nothing else keeps airplanes apart whose reports are lost";
+        let cause =
+            "the shield is off, and nothing else keeps airplanes apart whose reports are lost";
         return limit(cause, "add --set airspace.shield=on");
     }
     if matches!(world.method, MethodKind::External) {
@@ -92,15 +93,18 @@ fn check_airplanes(world: &AirspaceWorld) -> Result<(), FlightLimit> {
     for (i, airplane) in world.airplanes.iter().enumerate() {
         let name = world.display_name(i as u32);
         if airplane.track.is_some() || airplane.is_non_cooperative {
-            let cause = format!("airplane {name} follows a track, or is non-cooperative: it has no node");
+            let cause =
+                format!("airplane {name} follows a track, or is non-cooperative: it has no node");
             return limit(cause, "leave it out");
         }
         if world.appearance_cycle(i) > 0 {
-            let cause = format!("airplane {name} appears later, and all have to be there at the start");
+            let cause =
+                format!("airplane {name} appears later, and all have to be there at the start");
             return limit(cause, "leave out appears_s, or start a flight of its own for it");
         }
         if !airplane.orders.is_empty() || airplane.leaves_s.is_finite() {
-            let cause = format!("airplane {name} has orders, of which others would have to be told");
+            let cause =
+                format!("airplane {name} has orders, of which others would have to be told");
             return limit(cause, "leave out its orders");
         }
     }
@@ -123,7 +127,8 @@ fn check_air(world: &AirspaceWorld) -> Result<(), FlightLimit> {
         return limit(cause, remedy);
     }
     if world.surveillance.is_some() {
-        let cause = "airplanes see each other by simulated surveillance, and here they report themselves";
+        let cause =
+            "airplanes see each other by simulated surveillance, and here they report themselves";
         return limit(cause, "leave out [airspace.surveillance]");
     }
     Ok(())
