@@ -12,6 +12,7 @@ mod export;
 mod finish;
 mod fk;
 mod fleet;
+mod flight;
 mod ik;
 mod inspect;
 mod learn;

@@ -1,0 +1,1 @@
+//! Flights of nodes in threads, over a network in memory.
