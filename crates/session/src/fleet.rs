@@ -236,6 +236,31 @@ pub struct FlightNetwork {
 pub enum PlantChoice {
     /// A model in the node's own process, so that everything runs without hardware.
     Model(ModelPlantSettings),
+    /// An aircraft whose autopilot speaks MAVLink.
+    Mavlink(MavlinkSettings),
+}
+
+/// How an aircraft is reached by MAVLink, and what may be asked of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MavlinkSettings {
+    /// Where it is, as ground stations write it, e.g. `udp:127.0.0.1:14550`.
+    pub endpoint: String,
+    /// Its system; none for the only one that is there.
+    pub system_id: Option<u8>,
+    /// The system as which the node speaks.
+    pub own_system_id: u8,
+    /// A file with the key of signed frames.
+    pub key_file: Option<PathBuf>,
+    /// Where the origin of a planar scenario lies, as `LATITUDE,LONGITUDE[,ALTITUDE]` in degrees and meters.
+    pub origin: Option<String>,
+    /// Whether the aircraft is asked, once, to follow its node.
+    pub takes_control: bool,
+    /// The largest speed in meters per second that it is asked for; none for half as much again as that of its type.
+    pub max_speed_m_s: Option<f64>,
+    /// The largest acceleration in meters per second squared; none for half as much again as its type has in a turn.
+    pub max_acceleration_m_s2: Option<f64>,
+    /// Seconds to wait for its first heartbeat.
+    pub patience_s: f64,
 }
 
 /// How a model of an aircraft follows its setpoints.

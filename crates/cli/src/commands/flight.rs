@@ -222,7 +222,7 @@ fn parse_circle(text: &str) -> Result<Circle, String> {
     Ok(Circle(center, radius_m.ok_or_else(notation)?))
 }
 
-fn parse_positive(text: &str) -> Result<f64, String> {
+pub(crate) fn parse_positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x| (0.001..=86_400.0).contains(x));
     number.ok_or_else(|| "give a number from 0.001 to 86400".into())
 }

@@ -18,6 +18,7 @@ mod inspect;
 mod learn;
 mod man;
 mod map;
+mod mavlink;
 mod new;
 mod node;
 mod replay;

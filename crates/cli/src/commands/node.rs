@@ -1,6 +1,7 @@
 //! `sidestep node`: one agent of a fleet, as a process of its own.
 
 use super::flight::{FlightArgs, GuardArgs};
+use super::mavlink::MavlinkArgs;
 use crate::console::{Console, align_pairs};
 use crate::exit::{ExitCode, Failure};
 use crate::link::{LinkArgs, run_job};
@@ -29,6 +30,9 @@ Examples:
   sidestep node ring.toml --airplane 1 --start 2026-12-01T04:45:00Z --insecure \\
       --listen tcp/10.0.0.2:7601 --peers tcp/10.0.0.1:7601
                                    without a server
+  sidestep node ring.toml --airplane 0 --start 60 --origin 47.398,8.546,550 \\
+      --mavlink udp:127.0.0.1:14550 --take-control
+                                   a real aircraft: see docs/src/mavlink.md
 
 Give it the scenario, --set, --seed and --cycles of the fleet, and on a network that you do not trust certificates in place of --insecure. It runs its agent until the fleet \
 ends. When it has not heard the server for the time of --lease, it ends in lockstep; in real time \
@@ -84,7 +88,7 @@ pub(crate) struct NodeArgs {
     #[arg(long, value_name = "ENDPOINT", conflicts_with = "start")]
     vehicle: Option<String>,
 
-    /// Seconds to wait for the server
+    /// Seconds to wait for the server, or for the heartbeat of an aircraft
     #[arg(long, value_name = "S", default_value_t = 30.0)]
     patience: f64,
 
@@ -93,6 +97,9 @@ pub(crate) struct NodeArgs {
 
     #[command(flatten)]
     guard: GuardArgs,
+
+    #[command(flatten)]
+    mavlink: MavlinkArgs,
 
     #[command(flatten)]
     link: LinkArgs,
@@ -113,6 +120,10 @@ impl NodeArgs {
         let robot = self.robot.map(|id| AgentName::new(ROBOT, id, None));
         let given = airplane.or(robot).or_else(|| self.connector.clone());
         given.expect("the command line has one of them")
+    }
+
+    fn patience_s(&self) -> f64 {
+        self.patience.clamp(0.1, 86_400.0)
     }
 }
 
@@ -138,7 +149,7 @@ fn fly(args: &NodeArgs, clock: FlightClock, console: Console) -> Result<ExitCode
         agent: agent.clone(),
         clock,
         network: args.flight.network(&args.listen),
-        plant: args.guard.plant(),
+        plant: args.mavlink.plant(args.patience_s()).unwrap_or_else(|| args.guard.plant()),
         guard: args.guard.settings(),
     }));
     let mut end = FlightStatus::default();
@@ -191,7 +202,7 @@ fn join(args: &NodeArgs, console: Console) -> Result<ExitCode, Failure> {
         agent: args.agent(),
         connect: args.connect.clone(),
         listen: args.listen.clone(),
-        patience_s: args.patience.clamp(0.1, 86_400.0),
+        patience_s: args.patience_s(),
     };
     let job = match args.vehicle.clone() {
         None => Job::Node(job),

@@ -1,6 +1,7 @@
 //! The node of one airplane in a flight without a server, as a process.
 
 use super::certificates::{check_identity, check_names, credentials};
+use super::mavlink::MavlinkJob;
 use super::node::endpoint_error;
 use super::output::print_message;
 use super::parent_monitor::ParentMonitor;
@@ -110,7 +111,7 @@ pub(super) fn run(job: &FlightJob, parent: &ParentMonitor) -> Result<(), Error> 
     let compiled = flown.airspace()?;
     let world = &compiled.world;
     let limits = guard_limits(job, world, agent)?;
-    let plant = open_plant(job, world, agent)?;
+    let plant = open_plant(job, world, agent, parent)?;
     let listen = listen_endpoints(&job.network.listen)?;
     let options =
         PeerOptions { is_scouting: job.network.is_scouting, credentials: credentials.as_ref() };
@@ -177,6 +178,7 @@ fn open_plant(
     job: &FlightJob,
     world: &AirspaceWorld,
     agent: EntityId,
+    parent: &ParentMonitor,
 ) -> Result<Box<dyn AircraftPlant>, Error> {
     match &job.plant {
         PlantChoice::Model(settings) => {
@@ -184,13 +186,34 @@ fn open_plant(
             let model = ModelPlant::new(world.surface, *settings, job.clock.speed, seed);
             Ok(Box::new(model))
         }
+        PlantChoice::Mavlink(settings) => {
+            check_real_time(job)?;
+            let model = &world.airplanes[agent as usize].model;
+            let aircraft = MavlinkJob {
+                settings,
+                surface: world.surface,
+                model,
+                is_insecure: job.common.is_insecure,
+            };
+            Ok(Box::new(aircraft.open(parent)?))
+        }
     }
+}
+
+/// Checks that a second of the scenario is one: vehicles do not fly faster.
+fn check_real_time(job: &FlightJob) -> Result<(), InputError> {
+    if job.clock.speed == 1.0 {
+        return Ok(());
+    }
+    let cause = "a vehicle flies in real time";
+    Err(InputError::new(format!("--speed {}", job.clock.speed), cause, "leave it out"))
 }
 
 /// Returns whether a vehicle may be anywhere without harm: a model without errors endangers nobody.
 fn is_harmless(plant: &PlantChoice) -> bool {
     match plant {
         PlantChoice::Model(_) => true,
+        PlantChoice::Mavlink(_) => false,
     }
 }
 

@@ -27,6 +27,7 @@ mod fleet;
 mod flight;
 mod flight_recorder;
 mod log;
+mod mavlink;
 mod metrics;
 mod node;
 mod one_thread;
