@@ -269,3 +269,85 @@ impl FlightChannel {
         Some(ReceivedContent { from, incarnation, start_s, is_in_time, content })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::PacketTiming;
+    use crate::flight::message::Presence;
+    use crate::wire::memory::MemoryHub;
+
+    /// Loses all to an even node, and delays and doubles all to an odd one.
+    struct TestFaults;
+
+    impl ChannelModel for TestFaults {
+        fn arrivals(&mut self, packet: &PacketInTransit) -> Vec<PacketTiming> {
+            let arrives = packet.tick + 11;
+            let timing = PacketTiming { departs: packet.tick, arrives };
+            if packet.to.is_multiple_of(2) { Vec::new() } else { vec![timing; 2] }
+        }
+
+        fn tick_s(&self) -> f64 {
+            0.001
+        }
+
+        fn start_cycle(&mut self, _: Cycle) {}
+    }
+
+    fn channel(hub: &MemoryHub, me: PeerId, flight: u64) -> FlightChannel {
+        let config = ChannelConfig { me, flight, tolerance_s: 0.5, speed: 1.0 };
+        let wire = Box::new(hub.open_wire(me));
+        FlightChannel::new(config, wire, WallClock::system(), Some(Box::new(TestFaults)))
+    }
+
+    fn content() -> FlightContent {
+        FlightContent::Presence(Presence { is_ready: true, process: 7 })
+    }
+
+    const LONG: Duration = Duration::from_secs(60);
+
+    #[test]
+    fn the_faults_of_the_scenario_happen_to_what_is_broadcast_and_to_nothing_else() {
+        let hub = MemoryHub::default();
+        let mut sender = channel(&hub, PeerId::Node(0), 5);
+        let mut odd = channel(&hub, PeerId::Node(1), 5);
+        let mut even = channel(&hub, PeerId::Node(2), 5);
+        sender.broadcast(&[1, 2], content());
+        assert_eq!(odd.receive(Duration::ZERO), None, "it is delayed");
+        // The sender releases it while it listens.
+        assert_eq!(sender.receive(Duration::from_millis(50)), None);
+        for _ in 0..2 {
+            let received = odd.receive(LONG).expect("it comes twice");
+            assert_eq!((received.from, received.content), (PeerId::Node(0), content()));
+        }
+        assert_eq!((odd.receive(Duration::ZERO), even.receive(Duration::ZERO)), (None, None));
+        sender.send(&[PeerId::Node(2)], content());
+        assert!(even.receive(LONG).is_some());
+        assert_eq!(sender.sent().0, 2);
+    }
+
+    #[test]
+    fn what_is_of_no_such_flight_is_dropped_and_counted() {
+        let hub = MemoryHub::default();
+        let mut receiver = channel(&hub, PeerId::Node(0), 5);
+        let to = [PeerId::Node(0)];
+        channel(&hub, PeerId::Node(1), 6).send(&to, content());
+        let mut later = channel(&hub, PeerId::Node(2), 5);
+        later.set_start(10.0);
+        receiver.set_start(20.0);
+        later.send(&to, content());
+        hub.open_wire(PeerId::Node(3)).send(&to, b"nothing that is known");
+        channel(&hub, PeerId::Node(4), 5).send(&to, content());
+        let received = receiver.receive(LONG).expect("the last one is good");
+        assert_eq!(received.from, PeerId::Node(4));
+        let names: Vec<String> = receiver.counts().into_iter().map(|(name, _)| name).collect();
+        assert_eq!(names, ["other-flight", "other-start", "unreadable"]);
+        // A frame in its own name is of somebody else.
+        let wire = hub.open_wire(PeerId::Server);
+        let config = ChannelConfig { me: PeerId::Node(0), flight: 5, tolerance_s: 1.0, speed: 1.0 };
+        let mut liar = FlightChannel::new(config, Box::new(wire), WallClock::system(), None);
+        liar.send(&to, content());
+        assert_eq!(receiver.receive(Duration::from_millis(5)), None);
+        assert!(receiver.counts().contains(&("forged".to_string(), 1)));
+    }
+}

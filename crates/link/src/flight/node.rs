@@ -17,7 +17,7 @@ use crate::protocol::{AgentPacket, Incarnation, NodeStatusReport};
 use crate::wire::PeerId;
 use sidestep::kernel::network::NetworkAgent;
 use sidestep::kernel::{Cycle, EntityId};
-use sidestep::worlds::airspace::pilot::{AirplaneControl, Pilot};
+use sidestep::worlds::airspace::pilot::{AirplaneControl, Percept, Pilot};
 use sidestep::worlds::airspace::replica::{Replica, TimeShares};
 use sidestep_session::fleet::FlightStatus;
 use std::collections::{BTreeMap, BTreeSet};
@@ -32,9 +32,6 @@ const PRESENCE_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Time between two reports of a node's state.
 const STATUS_INTERVAL: Duration = Duration::from_millis(500);
-
-/// Time without a presence after which another one is no longer taken to be there.
-const PRESENCE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Part of the time for reports after which a report is sent again; each further time takes twice as long.
 const FIRST_REPEAT_SHARE: f64 = 0.125;
@@ -91,6 +88,8 @@ pub struct FlightSettings {
     pub cycles: Cycle,
     /// Silence in seconds after which the guard acts: the reference reaches farther.
     pub patience_s: f64,
+    /// Silence in seconds before the start after which another one is no longer taken to be there.
+    pub lease_s: f64,
 }
 
 /// A listener to the state of a node.
@@ -106,8 +105,8 @@ pub struct FlightNode<'a> {
     has_to_end: &'a dyn Fn() -> bool,
     on_status: StatusListener<'a>,
     others: Vec<EntityId>,
-    /// When each other one said before the start that it is there, and whether it was ready.
-    present: BTreeMap<EntityId, (Instant, bool)>,
+    /// When each other one said before the start that it is there.
+    present: BTreeMap<EntityId, Instant>,
     /// The last report of each other one.
     last_reports: BTreeMap<EntityId, FlightReport>,
     /// Reports of cycles to come.
@@ -269,8 +268,9 @@ impl<'a> FlightNode<'a> {
 
     /// Returns the others that are not there.
     fn absent(&self) -> Vec<EntityId> {
+        let lease_s = self.settings.lease_s;
         let is_there = |id: &EntityId| {
-            self.present.get(id).is_some_and(|(at, _)| at.elapsed() < PRESENCE_TIMEOUT)
+            self.present.get(id).is_some_and(|at| at.elapsed().as_secs_f64() < lease_s)
         };
         self.others.iter().copied().filter(|id| !is_there(id)).collect()
     }
@@ -410,7 +410,14 @@ impl<'a> FlightNode<'a> {
             self.state = "orbits";
             return Ok(Some(self.parts.pilot.stay_on_fallback(cycle, &missing)));
         }
-        let Some(percept) = self.parts.replica.percept() else { return Ok(None) };
+        let percept = self.parts.replica.percept();
+        // What others report is checked; what follows from it cannot make the pilot fail.
+        let is_sound = |percept: &Percept| percept.check(self.parts.replica.world()).is_ok();
+        let Some(percept) = percept.filter(is_sound) else {
+            self.count("impossible-percepts");
+            self.state = "orbits";
+            return Ok(Some(self.parts.pilot.stay_on_fallback(cycle, &[])));
+        };
         self.state = "talks";
         let tick = self.first_tick();
         self.talk = Some((tick, Instant::now()));
@@ -581,8 +588,8 @@ impl<'a> FlightNode<'a> {
             return;
         }
         match content {
-            FlightContent::Presence(presence) => {
-                self.present.insert(from, (Instant::now(), presence.is_ready));
+            FlightContent::Presence(_) => {
+                self.present.insert(from, Instant::now());
             }
             FlightContent::Recall => self.on_recall(from),
             FlightContent::Recalled(report) => self.on_recalled(*report),

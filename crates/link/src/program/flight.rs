@@ -141,6 +141,7 @@ pub(super) fn run(job: &FlightJob, parent: &ParentMonitor) -> Result<(), Error> 
         speed: job.clock.speed,
         cycles: scenario.compiled.plan().cycles,
         patience_s: job.guard.patience_s,
+        lease_s: job.common.lease_s,
     };
     let guard = Guard::new(plant, board, clock, limits);
     let has_to_end = || parent.has_ended();

@@ -158,6 +158,11 @@ fn run_job(job: Job) -> Result<(), Error> {
 /// Checks the options of a party of a flight without a server, and starts its log.
 fn check_flight_network(common: &CommonSettings, network: &FlightNetwork) -> Result<(), Error> {
     apply_common_settings(common, network.listen.iter().chain(&network.peers))?;
+    if let Some(address) = &common.metrics {
+        let cause = "a flight without a server serves no metrics";
+        let remedy = "leave it out; --json tells what was counted";
+        return Err(InputError::new(format!("--metrics {address}"), cause, remedy).into());
+    }
     if network.is_scouting && common.tls.is_none() && !common.is_insecure {
         let cause = "whoever is on this network would be found, and could take part";
         let remedy = "give --tls-ca, --tls-cert and --tls-key, or --insecure on a network that you trust; without \

@@ -19,3 +19,4 @@ mod support;
 mod threads;
 mod tls;
 mod vehicles;
+mod without_server;

@@ -1,7 +1,7 @@
 //! Replicas beside the run that knows all: what they know of it, and what is flown when reports are lost.
 
 use super::*;
-use crate::deploy::group::run_pilot_conversations;
+use crate::deploy::run_pilot_conversations;
 use crate::pilot::{ConversationSchedule, Maneuver, Pilot};
 use crate::{AirspaceRun, RemotePilotRun};
 use proptest::prelude::*;
@@ -329,9 +329,9 @@ proptest! {
         }
         prop_assert!(unheard > 0);
         let metrics = flight.run.metrics();
-        prop_assert_eq!(&metrics["losses"], &serde_json::json!(0), "{}", metrics);
+        prop_assert_eq!(&metrics["losses_of_separation"], &serde_json::json!(0), "{}", metrics);
         // The gap that errors need is kept, too.
-        let nearest_m = metrics["nearest_m"].as_f64().unwrap_or(f64::INFINITY);
+        let nearest_m = metrics["min_separation_m"].as_f64().unwrap_or(f64::INFINITY);
         prop_assert!(nearest_m >= 30.0 + 2.0 * 7.5 - 1e-6, "{}", nearest_m);
     }
 }
