@@ -22,8 +22,10 @@
 //! node/              the node of an agent
 //! ros2/              a run as a node of ROS 2, without ROS
 //! vda5050/           vehicles of a warehouse that carry out a plan (its broker.rs opens a socket, too)
-//! plant/             a real robot as its program sees it: measurements in, velocities out; by ROS 2
+//! plant/             a real robot or aircraft as its program sees it: measurements in, commands out; by ROS 2, or a model
+//! mavlink/           an aircraft whose autopilot speaks MAVLink (its socket.rs opens sockets, too)
 //! drive/             the program of a robot that drives a plant
+//! flight/            airplanes without a server: each node knows others by their reports
 //! program/           the process: its job, logs, metrics and child processes
 //! ```
 
@@ -34,8 +36,10 @@ mod chain;
 pub mod distributed;
 pub mod drive;
 mod faults;
+pub mod flight;
 pub mod hosted_run;
 pub mod identity;
+pub mod mavlink;
 pub mod messenger;
 pub mod node;
 pub mod peer;

@@ -6,6 +6,7 @@
 //! that is what certificates are for.
 
 use crate::peer::PeerId;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sidestep::kernel::digest::Digest;
 use sidestep::kernel::{Cycle, EntityId};
@@ -312,11 +313,21 @@ impl TransportFrame {
         postcard::take_from_bytes(body).ok().map(|(sender, _)| sender)
     }
 
-    /// Reads a frame.
+    /// Reads a frame of a fleet.
     ///
     /// # Errors
     /// With the reason why it cannot be read.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        Self::read(bytes)
+    }
+}
+
+impl<M: DeserializeOwned> TransportFrame<M> {
+    /// Reads a frame with any kind of messages.
+    ///
+    /// # Errors
+    /// With the reason why it cannot be read.
+    pub fn read(bytes: &[u8]) -> Result<Self, DecodeError> {
         if bytes.len() > MAX_FRAME_BYTES {
             return Err(DecodeError::TooLong);
         }

@@ -55,6 +55,10 @@ pub enum Job {
     Dispatch(DispatchJob),
     /// Drive a real robot by ROS 2.
     Drive(Box<DriveJob>),
+    /// Fly one airplane without a server.
+    Flight(Box<FlightJob>),
+    /// Record a flight without a server, of which some nodes are started here.
+    FlightRecorder(Box<FlightRecorderJob>),
 }
 
 /// The name of an agent, in the form used by people: `airplane 3`, or `connector 0.3` for part 3 of body 0.
@@ -164,6 +168,152 @@ pub struct VehicleJob {
     pub node: NodeJob,
     /// The endpoint at which the vehicle reaches it, e.g. `tcp/127.0.0.1:7700`; port 0 for any free one.
     pub endpoint: String,
+}
+
+/// Job of the node of one airplane in a flight without a server.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FlightJob {
+    /// Settings that all nodes and the recorder have.
+    pub common: CommonSettings,
+    /// The airplane.
+    pub agent: AgentName,
+    /// The time of the flight.
+    pub clock: FlightClock,
+    /// The network of the nodes.
+    pub network: FlightNetwork,
+    /// The aircraft that it leads.
+    pub plant: PlantChoice,
+    /// The limits of its guard.
+    pub guard: GuardSettings,
+}
+
+/// Job of the recorder of a flight without a server: it only listens, but for the nodes that it starts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FlightRecorderJob {
+    /// Settings that all nodes and the recorder have.
+    pub common: CommonSettings,
+    /// Number of nodes that are started here, of the airplanes with the lowest ids; all of them unless given.
+    pub nodes: Option<usize>,
+    /// The time of the flight.
+    pub clock: FlightClock,
+    /// The network of the nodes.
+    pub network: FlightNetwork,
+    /// The aircraft that nodes lead which are started here.
+    pub plant: PlantChoice,
+    /// The limits of their guards.
+    pub guard: GuardSettings,
+    /// Folder in which the run is recorded.
+    pub out: Option<PathBuf>,
+    /// Whether an earlier run there is replaced.
+    pub replace: bool,
+}
+
+/// The time of a flight without a server: each node goes by its own clock.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FlightClock {
+    /// When cycle 0 begins, in seconds since 1970, UTC; none if the recorder sets it once it has heard all.
+    pub start_s: Option<f64>,
+    /// Seconds of the scenario in a second.
+    pub speed: f64,
+    /// Seconds by which the clocks of two nodes may differ.
+    pub tolerance_s: f64,
+}
+
+/// The network of a flight without a server, and the place of a party in it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FlightNetwork {
+    /// Endpoints at which others reach this party.
+    pub listen: Vec<String>,
+    /// Endpoints of others to which it connects; one link between two parties is enough.
+    pub peers: Vec<String>,
+    /// Whether it also looks for others by multicast.
+    pub is_scouting: bool,
+}
+
+/// The aircraft that a node leads.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlantChoice {
+    /// A model in the node's own process, so that everything runs without hardware.
+    Model(ModelPlantSettings),
+    /// An aircraft whose autopilot speaks MAVLink.
+    Mavlink(MavlinkSettings),
+}
+
+/// How an aircraft is reached by MAVLink, and what may be asked of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MavlinkSettings {
+    /// Where it is, as ground stations write it, e.g. `udp:127.0.0.1:14550`.
+    pub endpoint: String,
+    /// Its system; none for the only one that is there.
+    pub system_id: Option<u8>,
+    /// The system as which the node speaks.
+    pub own_system_id: u8,
+    /// A file with the key of signed frames.
+    pub key_file: Option<PathBuf>,
+    /// Where the origin of a planar scenario lies, as `LATITUDE,LONGITUDE[,ALTITUDE]` in degrees and meters.
+    pub origin: Option<String>,
+    /// Whether the aircraft is asked, once, to follow its node.
+    pub takes_control: bool,
+    /// The largest speed in meters per second that it is asked for; none for half as much again as that of its type.
+    pub max_speed_m_s: Option<f64>,
+    /// The largest acceleration in meters per second squared; none for half as much again as its type has in a turn.
+    pub max_acceleration_m_s2: Option<f64>,
+    /// Seconds to wait for its first heartbeat.
+    pub patience_s: f64,
+}
+
+/// How a model of an aircraft follows its setpoints.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct ModelPlantSettings {
+    /// Seconds by which it lags behind; 0 to be where it is to be.
+    pub lag_s: f64,
+    /// Largest error in meters of each coordinate that it measures.
+    pub noise_m: f64,
+}
+
+/// The limits of the guard beside a node.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct GuardSettings {
+    /// The area that the aircraft must not leave.
+    pub fence: FenceSettings,
+    /// Distance in meters from its reference beyond which it is handed over; none for the errors for which the shield allows.
+    pub max_deviation_m: Option<f64>,
+    /// Age in seconds of its measurements beyond which it is handed over.
+    pub max_age_s: f64,
+    /// Seconds without a sign of life of the node's program after which it is handed over.
+    pub patience_s: f64,
+    /// Seconds before the start from which on it flies straight toward its first pose; 0 to wait there.
+    pub run_up_s: f64,
+}
+
+/// The area that an aircraft must not leave; everything unless something is given.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct FenceSettings {
+    /// Center and radius in meters of a circle.
+    pub circle: Option<([f64; 2], f64)>,
+    /// The corners of a polygon, if there are any. Meters east and north, as the center of the circle; on the earth
+    /// latitudes and longitudes in degrees.
+    pub polygon: Vec<[f64; 2]>,
+    /// The lowest and the highest altitude in meters.
+    pub altitude_m: Option<[f64; 2]>,
+}
+
+/// The state of a node in a flight without a server.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct FlightStatus {
+    /// The cycle that is flown.
+    pub cycle: Cycle,
+    /// What the node does, e.g. `waits`, `flies`, `orbits`, `held`, `arrived`.
+    pub state: String,
+    /// Distance in meters of the aircraft from its reference at the last measurement.
+    pub deviation_m: Option<f64>,
+    /// The largest one so far.
+    pub max_deviation_m: f64,
+    /// Acts of the guard since the last such line, in words.
+    pub events: Vec<String>,
+    /// What was counted, by name.
+    pub counts: Vec<(String, u64)>,
 }
 
 /// A watcher of a fleet, which takes no part in it.
@@ -428,6 +578,8 @@ pub enum LinkMessage {
     Drives(DriveStatus),
     /// A robot was driven, to its end or until it was stopped.
     Driven(DriveStatus),
+    /// The present state of a node in a flight without a server; the last such line is that at the end.
+    Flight(FlightStatus),
     /// The present state of the fleet.
     Fleet(FleetStatus),
     /// The scenery for watchers: everything that stays the same.
@@ -563,6 +715,12 @@ pub struct NodeStatus {
     pub packets_per_s: f64,
     /// Bytes that it sends in a second.
     pub bytes_per_s: f64,
+    /// Number of its reports that differ from the recorded run, in a flight without a server.
+    #[serde(default)]
+    pub differing: u64,
+    /// What the node has counted, by name, in a flight without a server.
+    #[serde(default)]
+    pub counts: Vec<(String, u64)>,
     /// Seconds since it was last heard.
     pub silent_s: Option<f64>,
 }

@@ -1,5 +1,6 @@
 //! `sidestep fleet`: a world with agents that are processes on a network.
 
+use super::flight::GuardArgs;
 use crate::console::{Console, align_pairs, group_thousands};
 use crate::exit::{ExitCode, Failure};
 use crate::fleet_table::FleetTable;
@@ -12,7 +13,8 @@ use sidestep::kernel::shell::sidestep_command;
 use sidestep::kernel::text::{KeyValues, key_value_pair};
 use sidestep_document::estimate::format_short;
 use sidestep_session::fleet::{
-    ClockMode, FleetJob, FleetStatus, Job, LinkMessage, Topology, check_loopback_multicast,
+    ClockMode, FleetJob, FleetStatus, FlightClock, FlightNetwork, FlightRecorderJob, Job,
+    LinkMessage, NodeStatus, Topology, check_loopback_multicast,
 };
 use std::net::SocketAddrV4;
 use std::path::PathBuf;
@@ -32,6 +34,9 @@ Examples:
                                            a process for each connector; where all
                                            rules are local: see the book
   sidestep fleet office.toml --watch       a process for each robot
+  sidestep fleet scenarios/airspace/multirotors.toml --no-server --out runs/air
+                                           airplanes without a server, as in the
+                                           field; this command only records
 
 The program sidestep-link does it: `cargo install --path crates/link`. In lockstep a fleet comes \
 out as `sidestep run` does, bit for bit. Ctrl-C ends all of its processes; a fleet in lockstep \
@@ -110,6 +115,18 @@ pub(crate) struct FleetArgs {
     #[arg(long, requires = "out")]
     packets: bool,
 
+    /// Fly airplanes without a server: nodes know each other by their reports, and this command only
+    /// records. In real time, with models of vehicles
+    #[arg(long, conflicts_with_all = ["clock", "topology", "multicast_group", "packets"])]
+    no_server: bool,
+
+    /// Seconds by which the clocks of two nodes may differ, without a server
+    #[arg(long, value_name = "S", default_value_t = 0.1, requires = "no_server")]
+    clock_tolerance: f64,
+
+    #[command(flatten)]
+    guard: GuardArgs,
+
     #[command(flatten)]
     link: LinkArgs,
 }
@@ -132,7 +149,8 @@ fn parse_group(text: &str) -> Result<SocketAddrV4, String> {
 
 /// What a fleet has come to.
 struct FleetEnd {
-    topology: TopologyArg,
+    /// The route of packets; none without a server.
+    topology: Option<TopologyArg>,
     summary: Value,
     outcome: KeyValues,
     fleet: FleetStatus,
@@ -144,11 +162,16 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     let mut table = FleetTable::new(console, args.watch);
     let mut end = None;
     args.check_group()?;
-    let topology = args.topology();
-    let result = run_job(&Job::Fleet(args.job(topology)), |message| match message {
+    let topology = (!args.no_server).then(|| args.topology());
+    let job = match topology {
+        Some(topology) => Job::Fleet(args.job(topology)),
+        None => Job::FlightRecorder(Box::new(args.recorder_job())),
+    };
+    let result = run_job(&job, |message| match message {
         LinkMessage::Listens(endpoints) => {
             // A fleet in lockstep with all its nodes here ends before a user could join or watch it.
-            if args.nodes.is_some() || args.clock == ClockArg::Realtime {
+            let has_server = !args.no_server;
+            if has_server && (args.nodes.is_some() || args.clock == ClockArg::Realtime) {
                 console.note(format!("The server listens at {}", endpoints.join(", ")));
             }
         }
@@ -163,7 +186,8 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
         | LinkMessage::Ros2(_)
         | LinkMessage::Dispatch(_)
         | LinkMessage::Drives(_)
-        | LinkMessage::Driven(_) => {}
+        | LinkMessage::Driven(_)
+        | LinkMessage::Flight(_) => {}
     });
     table.clear();
     if let Some(end) = end {
@@ -251,17 +275,43 @@ impl FleetArgs {
         }
     }
 
+    /// Returns the job of a recorder, which starts nodes here.
+    fn recorder_job(&self) -> FlightRecorderJob {
+        FlightRecorderJob {
+            common: self
+                .link
+                .common_settings(self.scenario.file.clone(), self.scenario.all_overrides()),
+            nodes: self.nodes,
+            clock: FlightClock {
+                start_s: None,
+                speed: self.speed,
+                tolerance_s: self.clock_tolerance,
+            },
+            network: FlightNetwork {
+                listen: self.listen.clone(),
+                peers: Vec::new(),
+                is_scouting: false,
+            },
+            plant: self.guard.plant(),
+            guard: self.guard.settings(),
+            out: self.out.clone(),
+            replace: self.replace,
+        }
+    }
+
+    /// Returns whether time passes by a clock.
+    fn is_realtime(&self) -> bool {
+        self.no_server || self.clock == ClockArg::Realtime
+    }
+
     fn print_next_step(&self, console: Console) {
         let Some(folder) = &self.out else { return };
         let resume = sidestep_command("resume", folder);
-        console.note(match self.clock {
-            ClockArg::Lockstep => format!("The run is incomplete; `{resume}` continues it."),
-            ClockArg::Realtime => {
-                let report = sidestep_command("report", folder);
-                format!(
-                    "The flight is cut off here, and what was flown is kept; `{report}` shows it."
-                )
-            }
+        console.note(if self.is_realtime() {
+            let report = sidestep_command("report", folder);
+            format!("The flight is cut off here, and what was flown is kept; `{report}` shows it.")
+        } else {
+            format!("The run is incomplete; `{resume}` continues it.")
         });
     }
 
@@ -269,7 +319,7 @@ impl FleetArgs {
     fn with_remedy(&self, failure: Failure) -> Failure {
         match (&self.out, failure) {
             (Some(folder), Failure::Other { cause, remedy })
-                if remedy == LOST_SERVER_REMEDY && self.clock == ClockArg::Realtime =>
+                if remedy == LOST_SERVER_REMEDY && self.is_realtime() =>
             {
                 let resume = sidestep_command("resume", folder);
                 let kept = "what was flown is on disk up to the last second";
@@ -304,14 +354,15 @@ impl FleetArgs {
         })
     }
 
-    fn network_lines(&self, topology: TopologyArg, fleet: &FleetStatus) -> KeyValues {
+    fn network_lines(&self, topology: Option<TopologyArg>, fleet: &FleetStatus) -> KeyValues {
         let nodes = &fleet.nodes;
         let topology = match topology {
-            TopologyArg::Mesh => "in a mesh",
-            TopologyArg::Star => "in a star",
-            TopologyArg::Multicast => "by multicast",
+            Some(TopologyArg::Mesh) => "in a mesh",
+            Some(TopologyArg::Star) => "in a star",
+            Some(TopologyArg::Multicast) => "by multicast",
+            None => "without a server",
         };
-        let clock = if self.clock == ClockArg::Lockstep { "lockstep" } else { "real time" };
+        let clock = if self.is_realtime() { "real time" } else { "lockstep" };
         let restarted: u64 = nodes.iter().map(|node| node.lives.saturating_sub(1)).sum();
         let packets = nodes.iter().map(|node| node.packets).sum();
         let bytes = nodes.iter().map(|node| node.bytes).sum();
@@ -322,7 +373,9 @@ impl FleetArgs {
                 format!("{} sent, {} bytes", group_thousands(packets), group_thousands(bytes)),
             ),
         ];
-        if self.clock == ClockArg::Realtime {
+        if self.no_server {
+            lines.extend(flight_lines(fleet));
+        } else if self.clock == ClockArg::Realtime {
             let late = format!(
                 "{} controls, {} cycles of the server",
                 group_thousands(nodes.iter().map(|node| node.late).sum()),
@@ -342,4 +395,31 @@ impl FleetArgs {
         }
         lines
     }
+}
+
+/// Returns what has become of the controls and reports of a flight without a server.
+fn flight_lines(fleet: &FleetStatus) -> KeyValues {
+    let sum = |number: fn(&NodeStatus) -> u64| fleet.nodes.iter().map(number).sum();
+    let counted = |name: &str| {
+        let counts = fleet.nodes.iter().flat_map(|node| &node.counts);
+        counts.filter(|(counted, _)| counted == name).map(|(_, count)| count).sum()
+    };
+    let controls = format!(
+        "{} flown, {} late, {} not recorded",
+        group_thousands(sum(|node| node.flown)),
+        group_thousands(counted("late-controls") + counted("refused-controls")),
+        group_thousands(sum(|node| node.late)),
+    );
+    let unheard = format!(
+        "{} cycles of an airplane without all reports around it",
+        group_thousands(counted("unheard-cycles"))
+    );
+    let differing = format!("{} reports", group_thousands(sum(|node| node.differing)));
+    let held = fleet.nodes.iter().filter(|node| node.state == "held").count();
+    vec![
+        key_value_pair("controls", controls),
+        key_value_pair("unheard", unheard),
+        key_value_pair("differ from the record", differing),
+        key_value_pair("handed over", format!("{held} vehicles")),
+    ]
 }

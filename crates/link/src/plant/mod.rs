@@ -3,6 +3,7 @@
 //! ```text
 //! aircraft.rs  an aircraft
 //! frames.rs    frames in other frames, as /tf tells them
+//! model.rs     a model of an aircraft
 //! inbox.rs     the last messages of a robot, and what is wrong with others
 //! ros2.rs      a robot that is a node of ROS 2
 //! ```
@@ -10,6 +11,7 @@
 pub mod aircraft;
 pub mod frames;
 pub mod inbox;
+pub mod model;
 pub mod ros2;
 
 use sidestep::worlds::robots::drive::DriveVelocity;

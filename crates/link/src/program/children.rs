@@ -6,10 +6,11 @@
 use crate::wire::zenoh::ONE_THREAD;
 use sidestep::kernel::EntityId;
 use sidestep_session::Error;
-use sidestep_session::fleet::{Job, JobError, LinkMessage, NodeJob};
+use sidestep_session::fleet::{Job, JobError, LinkMessage};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Time that nodes have to end when they are asked to.
@@ -27,8 +28,10 @@ const MIN_STABLE_UPTIME: Duration = Duration::from_secs(10);
 
 /// A node that is started here, and perhaps started again.
 struct NodeProcess {
-    job: NodeJob,
+    job: Job,
     child: Option<Child>,
+    /// Reads what the process prints, so that it never waits for that, and returns its last line.
+    output: Option<JoinHandle<Option<String>>>,
     started: Instant,
     /// Time at which it is started again, if it has ended.
     restart_at: Option<Instant>,
@@ -43,7 +46,7 @@ pub(super) struct NodeProcesses {
 }
 
 impl NodeProcess {
-    fn start(&mut self) -> Result<(), Error> {
+    fn start(&mut self, agent: EntityId) -> Result<(), Error> {
         let program = std::env::current_exe().map_err(start_error)?;
         let mut command = Command::new(program);
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
@@ -55,12 +58,14 @@ impl NodeProcess {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(start_error)?;
-        let mut line = serde_json::to_string(&Job::Node(self.job.clone())).expect("plain data");
+        let mut line = serde_json::to_string(&self.job).expect("plain data");
         line.push('\n');
         if let Some(stdin) = &mut child.stdin {
             // An error means that the process has ended at once, which `poll_exit` finds.
             let _ = stdin.write_all(line.as_bytes());
         }
+        let out = child.stdout.take();
+        self.output = out.map(|out| std::thread::spawn(move || read_output(agent, out)));
         self.child = Some(child);
         self.started = Instant::now();
         self.restart_at = None;
@@ -68,18 +73,40 @@ impl NodeProcess {
     }
 
     /// Returns how the node has ended, once it has.
-    fn poll_exit(&mut self) -> Option<String> {
+    fn poll_exit(&mut self) -> Option<NodeExit> {
         let child = self.child.as_mut()?;
         let status = child.try_wait().ok().flatten()?;
-        let reason = last_error(child).unwrap_or_else(|| describe_exit(status));
+        let last_line = self.output.take().and_then(|output| output.join().ok().flatten());
+        let reason = last_error(last_line).unwrap_or_else(|| describe_exit(status));
         self.child = None;
         self.restart_delay = if self.started.elapsed() > MIN_STABLE_UPTIME {
             MIN_RESTART_DELAY
         } else {
             (2 * self.restart_delay).min(MAX_RESTART_DELAY)
         };
-        Some(reason)
+        Some(NodeExit { reason, is_done: status.success() })
     }
+}
+
+/// The end of a node's process.
+struct NodeExit {
+    reason: String,
+    /// Whether it has done its job.
+    is_done: bool,
+}
+
+/// Reads all lines of a node, tells what its guard does, and returns the last one.
+fn read_output(agent: EntityId, out: ChildStdout) -> Option<String> {
+    let mut last_line = None;
+    for line in BufReader::new(out).lines().map_while(Result::ok) {
+        if let Ok(LinkMessage::Flight(status)) = serde_json::from_str(&line) {
+            for event in status.events {
+                tracing::warn!(agent, cycle = status.cycle, "{event}");
+            }
+        }
+        last_line = Some(line);
+    }
+    last_line
 }
 
 fn start_error(error: std::io::Error) -> Error {
@@ -87,10 +114,8 @@ fn start_error(error: std::io::Error) -> Error {
 }
 
 /// Returns the cause of the failure that a node has reported in its last line.
-fn last_error(child: &mut Child) -> Option<String> {
-    let out = BufReader::new(child.stdout.take()?);
-    let last_line = out.lines().map_while(Result::ok).last()?;
-    match serde_json::from_str(&last_line).ok()? {
+fn last_error(last_line: Option<String>) -> Option<String> {
+    match serde_json::from_str(&last_line?).ok()? {
         LinkMessage::Failed(JobError { cause, .. }) => Some(cause),
         _ => None,
     }
@@ -105,18 +130,19 @@ impl NodeProcesses {
     ///
     /// # Errors
     /// When a process cannot be started.
-    pub(super) fn start(jobs: BTreeMap<EntityId, NodeJob>, restarts: bool) -> Result<Self, Error> {
+    pub(super) fn start(jobs: BTreeMap<EntityId, Job>, restarts: bool) -> Result<Self, Error> {
         let mut processes = Self { nodes: BTreeMap::new(), restarts };
         for (agent, job) in jobs {
             let mut node = NodeProcess {
                 job,
                 child: None,
+                output: None,
                 started: Instant::now(),
                 restart_at: None,
                 // It is doubled before its first use.
                 restart_delay: MIN_RESTART_DELAY / 2,
             };
-            node.start()?;
+            node.start(agent)?;
             processes.nodes.insert(agent, node);
         }
         Ok(processes)
@@ -126,30 +152,29 @@ impl NodeProcesses {
     pub(super) fn poll_exits(&mut self) -> Vec<(EntityId, String)> {
         let mut ended = Vec::new();
         for (&agent, node) in &mut self.nodes {
-            if let Some(reason) = node.poll_exit() {
-                ended.push((agent, reason));
-                node.restart_at = self.restarts.then(|| Instant::now() + node.restart_delay);
+            if let Some(exit) = node.poll_exit() {
+                ended.push((agent, exit.reason));
+                let restarts = self.restarts && !exit.is_done;
+                node.restart_at = restarts.then(|| Instant::now() + node.restart_delay);
             }
         }
         ended
     }
 
-    /// Does the same, and starts nodes again that are due. One that is started again listens where it did before, as given by
-    /// `listens`: the other nodes reconnect to these endpoints.
+    /// Does the same, and starts nodes again that are due, with jobs that `renew` has changed: one that listens where it did
+    /// before is reached again by the others.
     ///
     /// # Errors
     /// When one cannot be started again.
     pub(super) fn poll_and_restart(
         &mut self,
-        listens: impl Fn(EntityId) -> Option<Vec<String>>,
+        renew: impl Fn(EntityId, &mut Job),
     ) -> Result<Vec<(EntityId, String)>, Error> {
         let ended = self.poll_exits();
         for (&agent, node) in &mut self.nodes {
             if node.restart_at.is_some_and(|at| at <= Instant::now()) {
-                if let Some(listens) = listens(agent) {
-                    node.job.listen = listens;
-                }
-                node.start()?;
+                renew(agent, &mut node.job);
+                node.start(agent)?;
             }
         }
         Ok(ended)

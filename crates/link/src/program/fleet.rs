@@ -32,7 +32,7 @@ use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep::worlds::WORLDS;
 use sidestep_record::CycleOrigin;
 use sidestep_session::fleet::{
-    CommonSettings, FleetJob, FleetScene, FleetStatus, LinkMessage, NodeJob, NodeStatus,
+    CommonSettings, FleetJob, FleetScene, FleetStatus, Job, LinkMessage, NodeJob, NodeStatus,
 };
 use sidestep_session::{Error, ManagedRun, OutputPaths, Watcher};
 use std::collections::BTreeMap;
@@ -163,7 +163,7 @@ fn node_jobs(
     job: &FleetJob,
     connect: &[String],
     world: &dyn DistributedWorld,
-) -> BTreeMap<EntityId, NodeJob> {
+) -> BTreeMap<EntityId, Job> {
     let listen = match job.topology {
         // The server's own address will do: these nodes are on its machine.
         Topology::Mesh => vec![with_port(&connect[0], 0)],
@@ -180,7 +180,7 @@ fn node_jobs(
             listen: listen.clone(),
             patience_s: job.common.lease_s.max(MIN_JOIN_TIMEOUT_S),
         };
-        jobs.insert(agent, job);
+        jobs.insert(agent, Job::Node(job));
     }
     jobs
 }
@@ -356,6 +356,7 @@ impl<'a> FleetSupervisor<'a> {
             packets_per_s: counter_increase(last_packets, status.packets) / passed_s,
             bytes_per_s: counter_increase(last_bytes, status.bytes) / passed_s,
             silent_s: silent.map(|silent| silent.as_secs_f64()),
+            ..NodeStatus::default()
         }
     }
 
@@ -385,9 +386,11 @@ impl ServerHooks for FleetSupervisor<'_> {
             self.denials.report();
             self.report(fleet);
         }
-        let ended = self.children.poll_and_restart(|agent| {
-            let member = fleet.nodes.get(&agent)?.member.as_ref()?;
-            Some(member.listens.clone())
+        let ended = self.children.poll_and_restart(|agent, job| {
+            let member = fleet.nodes.get(&agent).and_then(|node| node.member.as_ref());
+            if let (Job::Node(job), Some(member)) = (job, member) {
+                job.listen.clone_from(&member.listens);
+            }
         })?;
         // A node that ends before it has joined would end again: its job is wrong.
         if let Some((agent, reason)) = ended.first().filter(|_| !fleet.has_begun) {

@@ -7,6 +7,8 @@
 //! watch.rs           a viewer of a fleet; view.rs: the views at the server
 //! ros2.rs            a run as a node of ROS 2
 //! drive.rs           a real robot that is driven by ROS 2
+//! flight.rs          one airplane in a flight without a server
+//! flight_recorder.rs the recorder of such a flight, with the nodes that it starts
 //! scenario.rs        the scenario that server and nodes read
 //! certificates.rs    checks of certificates; denials.rs: what they do not allow, for the log
 //! one_thread.rs      the one thread of the network that encrypted links need
@@ -22,7 +24,10 @@ mod denials;
 mod dispatch;
 mod drive;
 mod fleet;
+mod flight;
+mod flight_recorder;
 mod log;
+mod mavlink;
 mod metrics;
 mod node;
 mod one_thread;
@@ -37,10 +42,13 @@ mod watch;
 use crate::identity::{CertificateName, VIEWER_NAME};
 use output::print_message;
 use parent_monitor::ParentMonitor;
+use sidestep::kernel::InputError;
 use sidestep::kernel::terminal::escape_controls;
 use sidestep::worlds::WORLDS;
 use sidestep_session::Error;
-use sidestep_session::fleet::{CommonSettings, Job, JobError, LinkMessage, VehicleJob};
+use sidestep_session::fleet::{
+    CommonSettings, FlightNetwork, Job, JobError, LinkMessage, VehicleJob,
+};
 use std::io::BufRead;
 use std::process::ExitCode;
 
@@ -136,7 +144,32 @@ fn run_job(job: Job) -> Result<(), Error> {
             apply_common_settings(&job.common, network.connect.iter().chain(&network.listen))?;
             drive::run(&job, &ParentMonitor::watch())
         }
+        Job::Flight(job) => {
+            check_flight_network(&job.common, &job.network)?;
+            flight::run(&job, &ParentMonitor::watch())
+        }
+        Job::FlightRecorder(job) => {
+            check_flight_network(&job.common, &job.network)?;
+            flight_recorder::run(&job, &ParentMonitor::watch())
+        }
     }
+}
+
+/// Checks the options of a party of a flight without a server, and starts its log.
+fn check_flight_network(common: &CommonSettings, network: &FlightNetwork) -> Result<(), Error> {
+    apply_common_settings(common, network.listen.iter().chain(&network.peers))?;
+    if let Some(address) = &common.metrics {
+        let cause = "a flight without a server serves no metrics";
+        let remedy = "leave it out; --json tells what was counted";
+        return Err(InputError::new(format!("--metrics {address}"), cause, remedy).into());
+    }
+    if network.is_scouting && common.tls.is_none() && !common.is_insecure {
+        let cause = "whoever is on this network would be found, and could take part";
+        let remedy = "give --tls-ca, --tls-cert and --tls-key, or --insecure on a network that you trust; without \
+                      --scout the parties are those of --peers";
+        return Err(InputError::new("--scout", cause, remedy).into());
+    }
+    Ok(())
 }
 
 /// Checks the options that server and nodes share, and starts their log.
@@ -158,7 +191,7 @@ fn check_build(build: &str) -> Result<(), Error> {
     }
     let cause = format!("sidestep-link is of sidestep {own}, and the command of {build}");
     let remedy = "install both from the same source: cargo install --path crates/link";
-    Err(sidestep::kernel::InputError::new("sidestep-link", cause, remedy).into())
+    Err(InputError::new("sidestep-link", cause, remedy).into())
 }
 
 /// Reports why a job failed, and returns the exit code.

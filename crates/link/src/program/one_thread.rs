@@ -27,6 +27,8 @@ fn certificates(job: &Job) -> Option<&Tls> {
         // Its link to the broker is none of Zenoh.
         Job::Dispatch(_) => None,
         Job::Drive(job) => job.common.tls.as_ref(),
+        Job::Flight(job) => job.common.tls.as_ref(),
+        Job::FlightRecorder(job) => job.common.tls.as_ref(),
     }
 }
 

@@ -90,6 +90,8 @@ struct ZenohConfig<'a> {
     connected_within: Option<Duration>,
     /// Whether it tells those who connect of each other.
     has_gossip: bool,
+    /// Whether it looks for others by multicast, and connects to those that it finds.
+    is_scouting: bool,
     /// Certificates, and the endpoint at which they control access.
     guard: Option<(&'a Credentials, Guarded)>,
 }
@@ -101,7 +103,7 @@ impl ZenohConfig<'_> {
         let connected = self.connected_within.map_or(-1, |within| within.as_millis() as i64);
         let mut keys = vec![
             ("mode", format!("{:?}", self.mode)),
-            ("scouting/multicast/enabled", "false".into()),
+            ("scouting/multicast/enabled", self.is_scouting.to_string()),
             ("scouting/gossip/enabled", self.has_gossip.to_string()),
             // A router would sleep that long before it opens, to find others by scouting.
             ("scouting/delay", "0".into()),
@@ -156,6 +158,15 @@ impl ZenohConfig<'_> {
         }
         zenoh::open(config).wait().map_err(|e| without_sources(&e.to_string()))
     }
+}
+
+/// How a party without a server finds others and proves its identity.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PeerOptions<'a> {
+    /// Whether it looks for others by multicast.
+    pub is_scouting: bool,
+    /// Its certificates, if there are any.
+    pub credentials: Option<&'a Credentials>,
 }
 
 /// A wire over one or two Zenoh sessions.
@@ -353,6 +364,35 @@ impl ZenohWire {
         Ok(Self { server: connect.to_vec(), ..wire })
     }
 
+    /// Returns the wire of a party without a server: a peer that listens at endpoints, connects to those of others, and looks
+    /// for further ones by multicast if it is to. It opens at once, and goes on to connect. A process with certificates needs
+    /// [`ONE_THREAD`].
+    ///
+    /// # Errors
+    /// When an endpoint cannot be bound.
+    pub fn peer_wire(
+        me: PeerId,
+        listen: &[String],
+        connect: &[String],
+        options: PeerOptions<'_>,
+    ) -> Result<Self, WireSetupError> {
+        connect.iter().try_for_each(|endpoint| host_and_port(endpoint).map(drop))?;
+        listen.iter().try_for_each(|endpoint| check_vacant(endpoint))?;
+        let guarded = match me {
+            PeerId::Node(agent) => Guarded::Mesh(agent),
+            PeerId::Server => Guarded::Server,
+        };
+        let config = ZenohConfig {
+            mode: "peer",
+            listen,
+            connect,
+            is_scouting: options.is_scouting,
+            guard: options.credentials.map(|own| (own, guarded)),
+            ..ZenohConfig::default()
+        };
+        Self::from_config(me, &config).map_err(|reason| endpoint_in_use(listen, reason))
+    }
+
     fn from_config(me: PeerId, config: &ZenohConfig<'_>) -> Result<Self, String> {
         let (frame_sender, frames) = channel();
         let echoes = EchoProbes::default();
@@ -401,8 +441,7 @@ impl ZenohWire {
             listen: &self.listens,
             connect: &self.connect,
             guard: self.credentials.as_ref().zip(guarded),
-            connected_within: None,
-            has_gossip: false,
+            ..ZenohConfig::default()
         };
         let link = config
             .open()

@@ -20,3 +20,4 @@ mod support;
 mod threads;
 mod tls;
 mod vehicles;
+mod without_server;

@@ -50,6 +50,7 @@ pub mod objective;
 mod perceive;
 pub mod pilot;
 mod purpose;
+pub mod replica;
 mod right_of_way;
 mod rows;
 pub mod scenario;

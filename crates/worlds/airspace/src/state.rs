@@ -302,6 +302,23 @@ impl AirspaceState {
         }
     }
 
+    /// Replaces the part of an airplane, as its own process reports it.
+    pub(super) fn replace_airplane(
+        &self,
+        slot: EntitySlot,
+        record: &AirplaneSnapshot,
+        orbit_pose: Pose2,
+    ) {
+        self.airplanes[slot as usize].restore(record);
+        self.set_turn_rate_rad_s(slot, record.turn_rate_rad_s);
+        self.set_orbit_pose(slot, orbit_pose);
+    }
+
+    /// Returns the part of an airplane.
+    pub(super) fn airplane_snapshot(&self, slot: EntitySlot) -> AirplaneSnapshot {
+        self.airplanes[slot as usize].to_snapshot(self.turn_rate_rad_s(slot))
+    }
+
     /// Returns the others with which an airplane is an exempt pair.
     pub(super) fn exempt_ids(&self, slot: EntitySlot) -> ExemptIds {
         lock(&self.exempt[slot as usize]).clone()

@@ -26,10 +26,10 @@ use crate::settings::Grouping;
 use crate::shield::PlanCertainty;
 use crate::world::AirspaceWorld;
 use cycle_state::{ConversationMismatch, PilotCyclePhase, PilotCycleState};
-use sidestep_kernel::EntityId;
 use sidestep_kernel::network::{
     DropCounts, DropReason, NetworkAgent, OutgoingPacket, PacketOutbox, digest_pieces, parse_packet,
 };
+use sidestep_kernel::{Cycle, EntityId};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -214,6 +214,20 @@ impl Pilot {
             control.events.push(Event::new(now, EventKind::Deadline, self.id));
         }
         (control, ManeuverCandidates::default())
+    }
+
+    /// Returns its control in a cycle in which it talks with nobody, because it does not know where some others are that
+    /// may be near: it stays on its stored fallback. The others are those `unheard`.
+    pub fn stay_on_fallback(&mut self, cycle: Cycle, unheard: &[EntityId]) -> AirplaneControl {
+        if self.world.has_resolution_memory() {
+            self.memory.record_maneuver(&Maneuver::Orbit);
+        }
+        let mut control = AirplaneControl::stay_on_orbit(self.id, cycle, self.memory.clone());
+        for &other in unheard {
+            let event = Event::new_for_pair(cycle, EventKind::Unheard, self.id, other);
+            control.events.push(event);
+        }
+        control
     }
 
     /// Returns how far it has come in the conversation that it is in, if it is in one.
