@@ -205,6 +205,7 @@ fn job(file: &Path, robot: u32, port: u16) -> DriveJob {
             scan: "scan".into(),
             bumper: "bumper".into(),
             cmd_vel: "cmd_vel".into(),
+            goal: "goal_pose".into(),
             is_stamped: false,
             map_frame: "map".into(),
             base_frame: None,
@@ -221,6 +222,7 @@ fn job(file: &Path, robot: u32, port: u16) -> DriveJob {
         },
         trips: Some(1),
         out: None,
+        bag: None,
         replace: false,
     }
 }
