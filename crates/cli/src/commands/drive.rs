@@ -6,7 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::link::run_job;
 use crate::scenario_args::ScenarioArgs;
 use crate::worlds;
-use clap::Args;
+use clap::{ArgGroup, Args};
 use serde_json::json;
 use sidestep::kernel::EntityId;
 use sidestep::kernel::text::key_value_pair;
@@ -36,7 +36,7 @@ first: it says what is promised and what is not. Have an emergency stop at hand.
 
 /// Drive a real robot of ROS 2 by the program of a robot of a scenario.
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, group = ArgGroup::new("written").args(["out", "bag"]).multiple(true))]
 pub(crate) struct DriveArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
@@ -58,7 +58,7 @@ pub(crate) struct DriveArgs {
     bag: Option<PathBuf>,
 
     /// Overwrite an earlier table and an earlier bag
-    #[arg(long)]
+    #[arg(long, requires = "written")]
     replace: bool,
 
     #[command(flatten)]

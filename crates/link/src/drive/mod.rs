@@ -221,7 +221,7 @@ impl<'a, P: Plant> Drive<'a, P> {
             is_news = true;
             self.status.at = Some((driven.end.col, driven.end.row));
             if let Some(log) = &mut self.log {
-                log.record(driven)?;
+                log.record(driven, self.last_s.unwrap_or(0.0))?;
             }
         }
         Ok(is_news)

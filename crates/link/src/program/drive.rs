@@ -116,6 +116,7 @@ fn motion_log(job: &DriveJob, world: &Arc<RobotsWorld>) -> Result<Option<MotionL
         effector: model.body.effector.name.clone(),
         actions: model.body.effector.actions.clone(),
         box_m: world.map.box_size_m,
+        cycle_s: job.settings.cycle_s,
     };
     let log = MotionLog::create(path, job.replace, names);
     let log = log.map_err(|error| {
