@@ -390,7 +390,9 @@ pub struct DriveJob {
     pub trips: Option<u64>,
     /// File for the table of its motions.
     pub out: Option<PathBuf>,
-    /// Whether an earlier file there is replaced.
+    /// Folder for a bag of what it measures and is commanded.
+    pub bag: Option<PathBuf>,
+    /// Whether an earlier file and an earlier bag there are replaced.
     pub replace: bool,
 }
 
@@ -405,6 +407,8 @@ pub struct DriveTopics {
     pub bumper: String,
     /// Where commands go, `geometry_msgs/msg/Twist`.
     pub cmd_vel: String,
+    /// Goals, `geometry_msgs/msg/PoseStamped`, for a robot that has no behavior of its own.
+    pub goal: String,
     /// Whether commands have a time: `geometry_msgs/msg/TwistStamped`.
     pub is_stamped: bool,
     /// The frame of the map.
@@ -455,6 +459,15 @@ pub struct DriveStatus {
     pub off_map: u64,
     /// Times that it slowed or stopped the robot because something was near.
     pub obstacles: u64,
+    /// Goals that it has taken.
+    #[serde(default)]
+    pub goals: u64,
+    /// Goals that were refused: in another frame, off the map, or out of reach.
+    #[serde(default)]
+    pub refused_goals: u64,
+    /// The goal to which it goes: column and row of its lower-left box.
+    #[serde(default)]
+    pub goal: Option<(u32, u32)>,
     /// Messages that could not be read, and so were dropped.
     pub unreadable: u64,
     /// Messages that were older than the one before, and so were dropped.

@@ -6,7 +6,7 @@ use crate::exit::{ExitCode, Failure};
 use crate::link::run_job;
 use crate::scenario_args::ScenarioArgs;
 use crate::worlds;
-use clap::Args;
+use clap::{ArgGroup, Args};
 use serde_json::json;
 use sidestep::kernel::EntityId;
 use sidestep::kernel::text::key_value_pair;
@@ -24,6 +24,10 @@ Examples:
       --base robot_2/base_link --out motions.csv
                                    its pose is that frame's in /tf; then
                                    sidestep learn effector --csv motions.csv
+  sidestep drive hall.toml --robot 2 --bag drives/2 \\
+      --set 'robots.2.behaviour={kind=\"external\"}'
+                                   it goes where goal_pose says, and its
+                                   messages are kept as a bag
 
 The program sidestep-link does it: `cargo install --path crates/link`. The robot needs no Sidestep: \
 it is a node of rmw_zenoh with odometry or frames, a laser, and a topic for velocities. It stands \
@@ -32,7 +36,7 @@ first: it says what is promised and what is not. Have an emergency stop at hand.
 
 /// Drive a real robot of ROS 2 by the program of a robot of a scenario.
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, group = ArgGroup::new("written").args(["out", "bag"]).multiple(true))]
 pub(crate) struct DriveArgs {
     #[command(flatten)]
     scenario: ScenarioArgs,
@@ -49,8 +53,12 @@ pub(crate) struct DriveArgs {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Overwrite an earlier table
-    #[arg(long, requires = "out")]
+    /// New folder for a ROS 2 bag of what it measures and is told
+    #[arg(long, value_name = "DIR")]
+    bag: Option<PathBuf>,
+
+    /// Overwrite an earlier table and an earlier bag
+    #[arg(long, requires = "written")]
     replace: bool,
 
     #[command(flatten)]
@@ -113,6 +121,10 @@ struct TopicArgs {
     /// Velocities for the robot (geometry_msgs/Twist)
     #[arg(long, value_name = "TOPIC", default_value = "cmd_vel")]
     cmd_vel: String,
+
+    /// Goals (geometry_msgs/PoseStamped), for a robot whose behavior is external
+    #[arg(long, value_name = "TOPIC", default_value = "goal_pose")]
+    goal: String,
 
     /// Send velocities with a time (geometry_msgs/TwistStamped)
     #[arg(long)]
@@ -197,6 +209,7 @@ impl DriveArgs {
             settings: self.limits.settings(),
             trips: self.trips,
             out: self.out.clone(),
+            bag: self.bag.clone(),
             replace: self.replace,
         }
     }
@@ -223,6 +236,7 @@ impl TopicArgs {
             scan: self.scan.clone(),
             bumper: self.bumper.clone(),
             cmd_vel: self.cmd_vel.clone(),
+            goal: self.goal.clone(),
             is_stamped: self.stamped,
             map_frame: self.map_frame.clone(),
             base_frame: self.base.clone(),
@@ -250,12 +264,19 @@ impl LimitArgs {
 pub(crate) fn drive(args: &DriveArgs, console: Console) -> Result<ExitCode, Failure> {
     let mut end = None;
     let mut guarded_by = None;
+    let mut goal = None;
     let result = run_job(&Job::Drive(Box::new(args.job())), |message| match message {
         LinkMessage::Ros2(graph) => print_graph(args, &graph, console),
-        LinkMessage::Drives(status) if status.guarded_by != guarded_by => {
-            let text = status.guarded_by.as_deref().unwrap_or("drives");
-            console.note(format!("Robot {} {text}", args.robot));
-            guarded_by = status.guarded_by;
+        LinkMessage::Drives(status) => {
+            if status.guarded_by != guarded_by {
+                let text = status.guarded_by.as_deref().unwrap_or("drives");
+                console.note(format!("Robot {} {text}", args.robot));
+                guarded_by = status.guarded_by;
+            }
+            if let Some((column, row)) = status.goal.filter(|at| goal != Some(*at)) {
+                console.note(format!("Robot {} goes to column {column}, row {row}", args.robot));
+            }
+            goal = status.goal;
         }
         LinkMessage::Driven(status) => end = Some(status),
         // `run_job` returns the failure; the others are of runs and fleets.
@@ -284,6 +305,8 @@ fn print_end(args: &DriveArgs, status: &DriveStatus, console: Console) -> Result
         "contacts": status.contacts,
         "timeouts": status.timeouts,
         "trips": status.trips,
+        "goals": status.goals,
+        "refused_goals": status.refused_goals,
         "stops_for_old_states": status.old_states,
         "stops_off_map": status.off_map,
         "brakes_before_obstacles": status.obstacles,
@@ -300,13 +323,14 @@ fn print_end(args: &DriveArgs, status: &DriveStatus, console: Console) -> Result
             key_value_pair("actions", status.actions.to_string()),
             key_value_pair("contacts", status.contacts.to_string()),
             key_value_pair("trips", status.trips.to_string()),
+            key_value_pair("goals", format!("{}, {} refused", status.goals, status.refused_goals)),
             key_value_pair("timeouts", status.timeouts.to_string()),
             key_value_pair("guard", stops),
             key_value_pair("dropped", dropped),
         ];
-        lines.extend(
-            args.out.iter().map(|path| key_value_pair("motions", path.display().to_string())),
-        );
+        let path = |name, path: &PathBuf| key_value_pair(name, path.display().to_string());
+        lines.extend(args.out.iter().map(|file| path("motions", file)));
+        lines.extend(args.bag.iter().map(|folder| path("bag", folder)));
         format!("Robot {}\n{}", args.robot, align_pairs(&lines))
     })
 }

@@ -2,16 +2,20 @@
 //! done what it was to do.
 //!
 //! ```text
+//! bag.rs         what was heard and commanded, as a bag of ROS 2
 //! motion_log.rs  the table of its motions, from which `sidestep learn effector` learns
 //! ```
 
+pub mod bag;
 pub mod motion_log;
 
 use crate::plant::{Plant, PlantState};
 use motion_log::MotionLog;
+use sidestep::kernel::ports::RecordError;
 use sidestep::worlds::robots::drive::DriveVelocity;
 use sidestep::worlds::robots::drive::controller::DriveState;
 use sidestep::worlds::robots::drive::driver::{DriveStep, Driver};
+use sidestep::worlds::robots::drive::grid::Pose2;
 use sidestep::worlds::robots::drive::guard::{GuardCause, GuardView};
 use sidestep_session::fleet::DriveStatus;
 use std::time::{Duration, Instant};
@@ -31,6 +35,9 @@ pub enum DriveError {
     /// The program of the robot refuses a percept.
     #[error("the percept is refused: {0}")]
     Percept(String),
+    /// The bag cannot be written.
+    #[error(transparent)]
+    Bag(#[from] RecordError),
     /// The table of motions cannot be written.
     #[error("the table of motions cannot be written: {0}")]
     Log(#[from] std::io::Error),
@@ -93,9 +100,16 @@ impl<'a, P: Plant> Drive<'a, P> {
             self.status.unreadable = state.unreadable;
             self.status.outdated = state.outdated;
             let step = self.step(&state)?;
-            let Some(step) = step else { continue };
+            // After the step, by which it is known where the robot stands.
+            let has_goal = state.goal.as_ref().is_some_and(|goal| self.take_goal(goal));
+            let Some(step) = step else {
+                if has_goal {
+                    on_status(&self.status(&state));
+                }
+                continue;
+            };
             self.plant.command(step.velocity).map_err(DriveError::Plant)?;
-            let is_news = self.record(&step)? || missing != state.missing;
+            let is_news = self.record(&step)? || has_goal || missing != state.missing;
             missing.clone_from(&state.missing);
             if is_news {
                 on_status(&self.status(&state));
@@ -135,6 +149,27 @@ impl<'a, P: Plant> Drive<'a, P> {
         let counts = self.driver.counts();
         let has_all_trips = self.end.trips.is_some_and(|trips| counts.trips >= trips);
         counts.actions >= self.end.actions || has_all_trips
+    }
+
+    /// Takes a goal, or refuses and tells it; returns true, because both are news.
+    fn take_goal(&mut self, goal: &Result<Pose2, String>) -> bool {
+        let taken = goal
+            .clone()
+            .and_then(|pose| self.driver.set_goal(&pose).map_err(|refusal| refusal.to_string()));
+        match taken {
+            Ok(place) => {
+                self.status.goals += 1;
+                self.status.goal = Some((place.col, place.row));
+            }
+            Err(reason) => {
+                self.status.refused_goals += 1;
+                tracing::warn!(
+                    "a goal is refused: {reason} ({} refused so far)",
+                    self.status.refused_goals
+                );
+            }
+        }
+        true
     }
 
     /// Goes on by a pose that is new. Without one the last velocity stays, but not for longer than measurements are fresh.
@@ -186,7 +221,7 @@ impl<'a, P: Plant> Drive<'a, P> {
             is_news = true;
             self.status.at = Some((driven.end.col, driven.end.row));
             if let Some(log) = &mut self.log {
-                log.record(driven)?;
+                log.record(driven, self.last_s.unwrap_or(0.0))?;
             }
         }
         Ok(is_news)

@@ -118,6 +118,7 @@ fn a_drive_ends_after_its_actions_with_a_table_and_a_robot_that_stands() {
         effector: "nomad".into(),
         actions: ["forward", "left", "right", "stay"].map(String::from).to_vec(),
         box_m: 0.5,
+        cycle_s: 0.5,
     };
     let log = MotionLog::create(&path, false, names.clone()).expect("a file");
     let mut plant = Corridor::new(usize::MAX);

@@ -3,6 +3,7 @@
 
 use super::frames::{FrameTree, FrameUpdate, floor_pose, frame_name};
 use super::{Measured, PlantState};
+use crate::ros2::goals::GoalPose;
 use sidestep::import::bag::cdr::{Cdr, decode};
 use sidestep::import::bag::messages::{Bool, Header, LaserScan, Odometry, TfMessage};
 use sidestep::worlds::robots::drive::grid::Pose2;
@@ -40,6 +41,8 @@ pub struct Inbox {
     /// When the last frame that moves has arrived.
     frames_arrived: Option<Instant>,
     scan: Option<Framed<Arc<RangeScan>>>,
+    /// The last goal since the last state, in the frame of the map, or why it is none.
+    goal: Option<Result<Pose2, String>>,
     is_pressed: bool,
     /// Whether the bumper was pressed since the last state.
     was_pressed: bool,
@@ -59,6 +62,7 @@ impl Inbox {
             odometry_base: None,
             frames_arrived: None,
             scan: None,
+            goal: None,
             is_pressed: false,
             was_pressed: false,
             poses: 0,
@@ -72,26 +76,30 @@ impl Inbox {
         self.poses
     }
 
-    /// Takes a message of odometry.
-    pub fn receive_odometry(&mut self, bytes: &[u8], arrived: Instant) {
-        let Some(message) = self.read::<Odometry>(bytes) else { return };
+    /// Takes a message of odometry, and returns whether it keeps it.
+    pub fn receive_odometry(&mut self, bytes: &[u8], arrived: Instant) -> bool {
+        let Some(message) = self.read::<Odometry>(bytes) else { return false };
         let Some(value) = floor_pose(&message.pose.pose) else {
             self.unreadable += 1;
-            return;
+            return false;
         };
         let before_s = self.odometry.as_ref().map(|odometry| odometry.measured.time_s);
-        let Some(time_s) = self.later_time(&message.header, before_s) else { return };
+        let Some(time_s) = self.later_time(&message.header, before_s) else { return false };
         let frame = frame_name(&message.header.frame_id).to_string();
         self.odometry_base = Some(frame_name(&message.child_frame_id).into());
         self.odometry = Some(Framed { frame, measured: Measured { value, time_s, arrived } });
         self.poses += u64::from(self.frames.base.is_none());
+        true
     }
 
-    /// Takes a message with frames, those that stay or those that move.
-    pub fn receive_frames(&mut self, bytes: &[u8], is_static: bool, arrived: Instant) {
-        let Some(message) = self.read::<TfMessage>(bytes) else { return };
+    /// Takes a message with frames, those that stay or those that move, and returns whether it keeps any.
+    pub fn receive_frames(&mut self, bytes: &[u8], is_static: bool, arrived: Instant) -> bool {
+        let Some(message) = self.read::<TfMessage>(bytes) else { return false };
+        let mut is_kept = false;
         for transform in &message.transforms {
-            match self.tree.update(transform, is_static) {
+            let update = self.tree.update(transform, is_static);
+            is_kept |= update == FrameUpdate::Kept;
+            match update {
                 FrameUpdate::Kept if is_static => {}
                 FrameUpdate::Kept if self.is_on_way(&transform.child_frame_id) => {
                     self.frames_arrived = Some(arrived);
@@ -102,6 +110,7 @@ impl Inbox {
                 FrameUpdate::Refused => self.unreadable += 1,
             }
         }
+        is_kept
     }
 
     /// Returns whether the pose of the robot depends on a frame: those of other robots come by the same topic.
@@ -110,9 +119,9 @@ impl Inbox {
         base.is_some_and(|base| self.tree.lookup(frame, base).is_some())
     }
 
-    /// Takes a scan.
-    pub fn receive_scan(&mut self, bytes: &[u8], arrived: Instant) {
-        let Some(message) = self.read::<LaserScan>(bytes) else { return };
+    /// Takes a scan, and returns whether it keeps it.
+    pub fn receive_scan(&mut self, bytes: &[u8], arrived: Instant) -> bool {
+        let Some(message) = self.read::<LaserScan>(bytes) else { return false };
         let scan = RangeScan {
             mount: Pose2::default(),
             first_rad: f64::from(message.angle_min_rad),
@@ -123,20 +132,32 @@ impl Inbox {
         };
         if !scan.is_valid() || scan.ranges_m.is_empty() || scan.ranges_m.len() > MAX_RANGES {
             self.unreadable += 1;
-            return;
+            return false;
         }
         let before_s = self.scan.as_ref().map(|scan| scan.measured.time_s);
-        let Some(time_s) = self.later_time(&message.header, before_s) else { return };
+        let Some(time_s) = self.later_time(&message.header, before_s) else { return false };
         let frame = frame_name(&message.header.frame_id).to_string();
         self.scan =
             Some(Framed { frame, measured: Measured { value: Arc::new(scan), time_s, arrived } });
+        true
     }
 
-    /// Takes a message of the bumper.
-    pub fn receive_bumper(&mut self, bytes: &[u8]) {
-        let Some(message) = self.read::<Bool>(bytes) else { return };
+    /// Takes a message of the bumper, and returns whether it keeps it.
+    pub fn receive_bumper(&mut self, bytes: &[u8]) -> bool {
+        let Some(message) = self.read::<Bool>(bytes) else { return false };
         self.is_pressed = message.data;
         self.was_pressed |= message.data;
+        true
+    }
+
+    /// Takes a goal in place of the last one, and returns whether it keeps it.
+    pub fn receive_goal(&mut self, bytes: &[u8]) -> bool {
+        let Some(goal) = GoalPose::from_pose_stamped(bytes) else {
+            self.unreadable += 1;
+            return false;
+        };
+        self.goal = Some(goal.in_map(&self.frames.map));
+        true
     }
 
     fn read<T: Cdr>(&mut self, bytes: &[u8]) -> Option<T> {
@@ -155,7 +176,7 @@ impl Inbox {
         Some(time_s)
     }
 
-    /// Returns what is known, and forgets that the bumper was pressed before.
+    /// Returns what is known, and forgets the goal and that the bumper was pressed before.
     pub fn take_state(&mut self) -> PlantState {
         let pose = self.pose();
         let scan = self.scan_on_robot();
@@ -168,6 +189,7 @@ impl Inbox {
             pose: pose.ok(),
             scan: scan.ok(),
             is_touching,
+            goal: self.goal.take(),
             missing,
             unreadable: self.unreadable,
             outdated: self.outdated,
@@ -211,7 +233,7 @@ mod tests {
     use super::*;
     use sidestep::import::bag::cdr::encode;
     use sidestep::import::bag::messages::{
-        Pose, PoseWithCovariance, Time, TransformStamped, TwistWithCovariance,
+        Pose, PoseStamped, PoseWithCovariance, Time, TransformStamped, TwistWithCovariance,
     };
 
     const HALF_TURN: [f64; 4] = [0.0, 0.0, 1.0, 0.0];
@@ -307,6 +329,25 @@ mod tests {
         inbox.receive_odometry(&odometry(0.7, 2.0), now);
         inbox.receive_odometry(&odometry(0.7, 1.0), now);
         assert_eq!(inbox.take_state().outdated, 2);
+    }
+
+    #[test]
+    fn the_last_goal_is_told_once_and_one_of_another_frame_with_the_reason() {
+        let goal = |frame: &str, x_m: f64| {
+            let pose = Pose { position: [x_m, 0.0, 0.0], orientation: [0.0, 0.0, 0.0, 1.0] };
+            encode(&PoseStamped { header: header(frame, 1.0), pose })
+        };
+        let mut inbox = inbox(None);
+        assert_eq!(inbox.take_state().goal, None);
+        inbox.receive_goal(&goal("map", 1.0));
+        inbox.receive_goal(&goal("map", 2.0));
+        assert!(!inbox.receive_goal(&[1, 2, 3]), "it is no message");
+        let state = inbox.take_state();
+        assert_eq!(state.goal.expect("a goal").expect("of the map").at_m, [2.0, 0.0]);
+        assert_eq!(state.unreadable, 1);
+        assert_eq!(inbox.take_state().goal, None);
+        inbox.receive_goal(&goal("odom", 1.0));
+        assert!(inbox.take_state().goal.expect("a goal").is_err_and(|why| why.contains("odom")));
     }
 
     #[test]

@@ -40,6 +40,8 @@ pub struct PlantState {
     pub scan: Option<Measured<Arc<RangeScan>>>,
     /// Whether its bumper is pressed, or was since the state before.
     pub is_touching: bool,
+    /// A goal that has come since the state before, in the frame of the map, or the reason why it is none.
+    pub goal: Option<Result<Pose2, String>>,
     /// What it lacks for a pose or a scan, in words.
     pub missing: Option<String>,
     /// Number of messages that could not be read.

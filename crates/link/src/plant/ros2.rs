@@ -2,12 +2,18 @@
 
 use super::inbox::{Inbox, PlantFrames};
 use super::{Plant, PlantState};
+use crate::drive::bag::DriveBag;
 use crate::ros2::node::RosNode;
 use crate::ros2::rmw::QualityOfService;
 use crate::wire::endpoint::WireSetupError;
-use sidestep::import::bag::messages::{Bool, Header, LaserScan, Message, Odometry, Time};
-use sidestep::import::bag::messages::{TfMessage, Twist, TwistStamped};
+use sidestep::import::bag::messages::{
+    Bool, Header, LaserScan, Message, Odometry, Pose, PoseStamped, TfMessage, Time, Twist,
+    TwistStamped,
+};
+use sidestep::kernel::math::{cos, sin};
+use sidestep::kernel::ports::RecordError;
 use sidestep::worlds::robots::drive::DriveVelocity;
+use sidestep::worlds::robots::drive::grid::Pose2;
 use sidestep_session::fleet::DriveTopics;
 use sidestep_session::ros::{RosMessage, STATIC_TF_TOPIC, TF_TOPIC};
 use std::fmt;
@@ -22,6 +28,8 @@ const BASE_FRAME: &str = "base_link";
 struct SharedInbox {
     inbox: Mutex<Inbox>,
     arrived: Condvar,
+    /// What is kept for later, and the reason why it is not anymore.
+    bag: Mutex<Option<DriveBag>>,
 }
 
 impl SharedInbox {
@@ -29,10 +37,32 @@ impl SharedInbox {
         self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn receive(&self, put: impl FnOnce(&mut Inbox, Instant)) {
-        put(&mut self.lock(), Instant::now());
-        self.arrived.notify_all();
+    fn bag(&self) -> MutexGuard<'_, Option<DriveBag>> {
+        self.bag.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    /// Takes a message of a topic; what is none is not recorded.
+    fn receive<M: Message>(
+        &self,
+        topic: &str,
+        bytes: &[u8],
+        put: impl FnOnce(&mut Inbox, Instant) -> bool,
+    ) {
+        let is_kept = put(&mut self.lock(), Instant::now());
+        self.arrived.notify_all();
+        if let Some(bag) = self.bag().as_mut().filter(|_| is_kept) {
+            bag.record::<M>(topic, bytes);
+        }
+    }
+}
+
+/// What a robot is beside its topics.
+#[derive(Debug, Default)]
+pub struct PlantOptions {
+    /// Whether it goes where it is told.
+    pub takes_goals: bool,
+    /// Where its messages and commands are recorded.
+    pub bag: Option<DriveBag>,
 }
 
 /// A robot by its topics.
@@ -44,6 +74,8 @@ pub struct Ros2Plant {
     topics: DriveTopics,
     /// The full name of the topic of commands.
     cmd_vel: String,
+    /// The name under which the poses in the map are recorded.
+    pose: String,
     /// The time of the last pose in seconds.
     time_s: f64,
 }
@@ -54,49 +86,96 @@ impl fmt::Debug for Ros2Plant {
     }
 }
 
+/// A topic to which a robot's program listens.
+struct Listening<'a> {
+    node: &'a mut RosNode,
+    shared: &'a Arc<SharedInbox>,
+}
+
+impl Listening<'_> {
+    fn listen<M: Message>(
+        &mut self,
+        topic: &str,
+        quality: QualityOfService,
+        put: fn(&mut Inbox, &[u8], Instant) -> bool,
+    ) -> Result<(), WireSetupError> {
+        let to = self.shared.clone();
+        let topic = self.node.resolve(topic);
+        let name = topic.clone();
+        self.node.subscribe(&topic, M::NAME, quality, move |bytes| {
+            to.receive::<M>(&name, bytes, |inbox, arrived| put(inbox, bytes, arrived));
+        })
+    }
+}
+
 impl Ros2Plant {
     /// Listens to the topics of a robot.
     ///
     /// # Errors
     /// When the session is closed.
-    pub fn start(mut node: RosNode, topics: &DriveTopics) -> Result<Self, WireSetupError> {
+    pub fn start(
+        mut node: RosNode,
+        topics: &DriveTopics,
+        options: PlantOptions,
+    ) -> Result<Self, WireSetupError> {
         let frames = PlantFrames { map: topics.map_frame.clone(), base: topics.base_frame.clone() };
-        let shared = SharedInbox { inbox: Mutex::new(Inbox::new(frames)), arrived: Condvar::new() };
-        let shared = Arc::new(shared);
+        let shared = Arc::new(SharedInbox {
+            inbox: Mutex::new(Inbox::new(frames)),
+            arrived: Condvar::new(),
+            bag: Mutex::new(options.bag),
+        });
         let volatile = QualityOfService::DEFAULT;
         let latched = QualityOfService::LATCHED;
-        let to = shared.clone();
-        node.subscribe(STATIC_TF_TOPIC, TfMessage::NAME, latched, move |bytes| {
-            to.receive(|inbox, arrived| inbox.receive_frames(bytes, true, arrived));
+        let mut listening = Listening { node: &mut node, shared: &shared };
+        listening.listen::<TfMessage>(STATIC_TF_TOPIC, latched, |inbox, bytes, arrived| {
+            inbox.receive_frames(bytes, true, arrived)
         })?;
-        let to = shared.clone();
-        node.subscribe(TF_TOPIC, TfMessage::NAME, volatile, move |bytes| {
-            to.receive(|inbox, arrived| inbox.receive_frames(bytes, false, arrived));
+        listening.listen::<TfMessage>(TF_TOPIC, volatile, |inbox, bytes, arrived| {
+            inbox.receive_frames(bytes, false, arrived)
         })?;
-        let to = shared.clone();
-        node.subscribe(&node.resolve(&topics.odom), Odometry::NAME, volatile, move |bytes| {
-            to.receive(|inbox, arrived| inbox.receive_odometry(bytes, arrived));
+        listening.listen::<Odometry>(&topics.odom, volatile, Inbox::receive_odometry)?;
+        listening.listen::<LaserScan>(&topics.scan, volatile, Inbox::receive_scan)?;
+        listening.listen::<Bool>(&topics.bumper, volatile, |inbox, bytes, _| {
+            inbox.receive_bumper(bytes)
         })?;
-        let to = shared.clone();
-        node.subscribe(&node.resolve(&topics.scan), LaserScan::NAME, volatile, move |bytes| {
-            to.receive(|inbox, arrived| inbox.receive_scan(bytes, arrived));
-        })?;
-        let to = shared.clone();
-        node.subscribe(&node.resolve(&topics.bumper), Bool::NAME, volatile, move |bytes| {
-            to.receive(|inbox, _| inbox.receive_bumper(bytes));
-        })?;
+        if options.takes_goals {
+            listening.listen::<PoseStamped>(&topics.goal, volatile, |inbox, bytes, _| {
+                inbox.receive_goal(bytes)
+            })?;
+        }
         let cmd_vel = node.resolve(&topics.cmd_vel);
-        Ok(Self { node, shared, seen: 0, topics: topics.clone(), cmd_vel, time_s: 0.0 })
+        let pose = format!("{}/pose", node.full_name());
+        Ok(Self { node, shared, seen: 0, topics: topics.clone(), cmd_vel, pose, time_s: 0.0 })
+    }
+
+    /// Leaves the network, and completes the bag.
+    ///
+    /// # Errors
+    /// When the bag cannot be written, or could not at some time before.
+    pub fn end(self) -> Result<(), RecordError> {
+        self.node.leave();
+        let bag = self.shared.bag().take();
+        bag.map_or(Ok(()), DriveBag::finish)
+    }
+
+    /// Records the pose that the program goes by.
+    fn record_pose(&self, time_s: f64, pose: &Pose2) {
+        let Some(bag) = &mut *self.shared.bag() else { return };
+        let frame_id = self.topics.map_frame.clone();
+        let header = Header { stamp: Time::from_secs(time_s), frame_id };
+        let half_rad = pose.yaw_rad / 2.0;
+        let turn = [0.0, 0.0, sin(half_rad), cos(half_rad)];
+        let pose = Pose { position: [pose.at_m[0], pose.at_m[1], 0.0], orientation: turn };
+        bag.record_message(&RosMessage::new(
+            self.pose.clone(),
+            time_s,
+            &PoseStamped { header, pose },
+        ));
     }
 
     /// Returns the node.
     pub fn node(&self) -> &RosNode {
         &self.node
-    }
-
-    /// Leaves the network.
-    pub fn leave(self) {
-        self.node.leave();
     }
 
     fn message(&self, velocity: DriveVelocity) -> RosMessage {
@@ -124,6 +203,9 @@ impl Plant for Ros2Plant {
         let state = inbox.take_state();
         drop(inbox);
         if let Some(pose) = &state.pose {
+            if pose.time_s != self.time_s {
+                self.record_pose(pose.time_s, &pose.value);
+            }
             self.time_s = pose.time_s;
         }
         state
@@ -131,6 +213,9 @@ impl Plant for Ros2Plant {
 
     fn command(&mut self, velocity: DriveVelocity) -> Result<(), String> {
         let message = self.message(velocity);
+        if let Some(bag) = &mut *self.shared.bag() {
+            bag.record_message(&message);
+        }
         let sent = self.node.publish_as(&self.cmd_vel, &message);
         sent.map_err(|error| error.to_string())
     }

@@ -3,10 +3,11 @@
 use super::output::print_message;
 use super::parent_monitor::ParentMonitor;
 use super::ros2::{network_error, with_ports};
+use crate::drive::bag::DriveBag;
 use crate::drive::motion_log::{MotionLog, MotionNames};
 use crate::drive::{Drive, DriveEnd, DriveError};
 use crate::plant::Plant;
-use crate::plant::ros2::Ros2Plant;
+use crate::plant::ros2::{PlantOptions, Ros2Plant};
 use crate::ros2::node::RosNode;
 use sidestep::kernel::InputError;
 use sidestep::worlds::WORLDS;
@@ -58,7 +59,8 @@ pub(super) fn run(job: &DriveJob, parent: &ParentMonitor) -> Result<(), Error> {
     let node = node.map_err(network_error)?;
     // After the network: what is wrong there leaves no file behind.
     let log = motion_log(job, world)?;
-    let mut plant = Ros2Plant::start(node, &job.topics).map_err(network_error)?;
+    let options = PlantOptions { takes_goals: driver.takes_goals(), bag: drive_bag(job)? };
+    let mut plant = Ros2Plant::start(node, &job.topics, options).map_err(network_error)?;
     // So that the topic of commands is known before the first measurement, and a robot that moves stands.
     plant.command(DriveVelocity::ZERO).map_err(|cause| drive_error(DriveError::Plant(cause)))?;
     print_message(&LinkMessage::Listens(network.listen.clone()));
@@ -71,8 +73,9 @@ pub(super) fn run(job: &DriveJob, parent: &ParentMonitor) -> Result<(), Error> {
     print_message(&LinkMessage::Driven(drive.final_status()));
     // The robot is told to stand before the node leaves.
     drop(drive);
-    plant.leave();
-    passed.map_err(drive_error)
+    let stored = plant.end();
+    passed.map_err(drive_error)?;
+    stored.map_err(|error| drive_error(DriveError::Bag(error)))
 }
 
 fn side_m(world: &RobotsWorld, robot: u32) -> f64 {
@@ -113,6 +116,7 @@ fn motion_log(job: &DriveJob, world: &Arc<RobotsWorld>) -> Result<Option<MotionL
         effector: model.body.effector.name.clone(),
         actions: model.body.effector.actions.clone(),
         box_m: world.map.box_size_m,
+        cycle_s: job.settings.cycle_s,
     };
     let log = MotionLog::create(path, job.replace, names);
     let log = log.map_err(|error| {
@@ -125,12 +129,25 @@ fn motion_log(job: &DriveJob, world: &Arc<RobotsWorld>) -> Result<Option<MotionL
     Ok(Some(log))
 }
 
+fn drive_bag(job: &DriveJob) -> Result<Option<DriveBag>, Error> {
+    let Some(folder) = &job.bag else { return Ok(None) };
+    let bag = DriveBag::create(folder, job.replace).map_err(|error| {
+        let remedy = match error.kind() {
+            io::ErrorKind::AlreadyExists if job.replace => "give another folder",
+            io::ErrorKind::AlreadyExists => "give another folder, or --replace",
+            _ => "see whether its parent is there and can be written",
+        };
+        InputError::new(folder.display().to_string(), error.to_string(), remedy)
+    })?;
+    Ok(Some(bag))
+}
+
 fn drive_error(error: DriveError) -> Error {
     let remedy = match &error {
         DriveError::Interrupted => return Error::Interrupted,
         DriveError::Plant(_) => "see whether its router is still there",
         DriveError::Percept(_) => "its behavior and its sensors do not fit; see sidestep check",
-        DriveError::Log(_) => "see whether the disk is full",
+        DriveError::Log(_) | DriveError::Bag(_) => "see whether the disk is full",
     };
     Error::other(error.to_string(), remedy)
 }

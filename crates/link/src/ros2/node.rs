@@ -1,15 +1,17 @@
 //! The node on the network: its topics and services.
 
+use super::goals::GoalPose;
 use super::rmw::{
     Attachment, EndpointKind, Gid, QualityOfService, RosEndpoint, RosNodeName, RosType,
     gid_of_token,
 };
+use super::trajectories::read_trajectory;
 use super::types::{TRIGGER, TWIST_NAME, message_type};
 use super::velocity::Velocity;
 use crate::wire::endpoint::{WireSetupError, without_sources};
 use crate::wire::zenoh::open_ros2_session;
 use sidestep::import::bag::cdr::encode;
-use sidestep::import::bag::messages::TriggerResponse;
+use sidestep::import::bag::messages::{JointTrajectory, Message, PoseStamped, TriggerResponse};
 use sidestep::kernel::EntityId;
 use sidestep_session::fleet::{Ros2Job, RosGraph, RosNetwork};
 use sidestep_session::ros::RosMessage;
@@ -97,6 +99,20 @@ pub enum RosInput {
         robot: EntityId,
         /// What it is asked for.
         velocity: Velocity,
+    },
+    /// A place for a robot.
+    Goal {
+        /// The robot.
+        robot: EntityId,
+        /// Where it should go.
+        goal: GoalPose,
+    },
+    /// A trajectory for an arm.
+    Trajectory {
+        /// The number of its chain.
+        arm: EntityId,
+        /// Where its joints should go.
+        trajectory: JointTrajectory,
     },
 }
 
@@ -222,6 +238,11 @@ impl RosNode {
         self.name.resolve(topic)
     }
 
+    /// Returns the full name of the node.
+    pub fn full_name(&self) -> String {
+        self.name.full_name()
+    }
+
     /// Listens to a topic by its full name, and calls `on_message` with the bytes of each message. A latched topic brings
     /// the messages before this, too.
     ///
@@ -318,16 +339,54 @@ impl RosNode {
     /// # Errors
     /// When the session is closed.
     pub fn hear_velocities(&mut self, robot: EntityId) -> Result<(), WireSetupError> {
-        let topic = self.resolve(&format!("robot_{robot}/cmd_vel"));
+        let topic = format!("robot_{robot}/cmd_vel");
+        self.hear(&topic, TWIST_NAME, move |bytes| {
+            let velocity = Velocity::from_twist(bytes)?;
+            Some(RosInput::Velocity { robot, velocity })
+        })
+    }
+
+    /// Hears goals for a robot from now on.
+    ///
+    /// # Errors
+    /// When the session is closed.
+    pub fn hear_goals(&mut self, robot: EntityId) -> Result<(), WireSetupError> {
+        let topic = format!("robot_{robot}/goal_pose");
+        self.hear(&topic, PoseStamped::NAME, move |bytes| {
+            let goal = GoalPose::from_pose_stamped(bytes)?;
+            Some(RosInput::Goal { robot, goal })
+        })
+    }
+
+    /// Hears trajectories for an arm, by the number of its chain, from now on.
+    ///
+    /// # Errors
+    /// When the session is closed.
+    pub fn hear_trajectories(&mut self, arm: EntityId) -> Result<(), WireSetupError> {
+        let topic = format!("chain_{arm}/joint_trajectory");
+        self.hear(&topic, JointTrajectory::NAME, move |bytes| {
+            let trajectory = read_trajectory(bytes)?;
+            Some(RosInput::Trajectory { arm, trajectory })
+        })
+    }
+
+    /// Hears a topic of the namespace from now on; bytes that `read` does not know are counted.
+    fn hear(
+        &mut self,
+        topic: &str,
+        type_name: &str,
+        read: impl Fn(&[u8]) -> Option<RosInput> + Send + Sync + Clone + 'static,
+    ) -> Result<(), WireSetupError> {
         let inputs = self.input_sender.clone();
         let malformed = self.malformed.clone();
-        self.subscribe(&topic, TWIST_NAME, QualityOfService::DEFAULT, move |bytes| {
-            let Some(velocity) = Velocity::from_twist(bytes) else {
+        let topic = self.resolve(topic);
+        self.subscribe(&topic, type_name, QualityOfService::DEFAULT, move |bytes| {
+            let Some(input) = read(bytes) else {
                 malformed.fetch_add(1, Ordering::Relaxed);
                 return;
             };
             // An error means that the node has ended.
-            let _ = inputs.send(RosInput::Velocity { robot, velocity });
+            let _ = inputs.send(input);
         })
     }
 

@@ -1,8 +1,11 @@
 //! A run that passes at a speed, and that services pause, step and reset.
 
+use super::goals::{GoalOrders, TRIP_ORDER};
 use super::node::{RosInput, RosNode, RunService, ServiceRequest};
+use super::trajectories::{JOINTS_ORDER, TrajectoryOrders};
 use super::velocity::{ACTION_ORDER, VelocityOrders};
 use crate::wire::endpoint::WireSetupError;
+use sidestep::kernel::EntityId;
 use sidestep::kernel::control::MultiAgentOrder;
 use sidestep_session::fleet::RosGraph;
 use sidestep_session::ros::RunTopics;
@@ -40,6 +43,8 @@ pub struct RosRun<'a> {
     run: ManagedRun,
     topics: RunTopics,
     velocities: VelocityOrders,
+    goals: GoalOrders,
+    trajectories: TrajectoryOrders,
     node: &'a mut RosNode,
     watcher: &'static dyn Watcher,
     /// The state at the start, to which the run is reset.
@@ -68,6 +73,14 @@ impl<'a> RosRun<'a> {
         for robot in velocities.robots() {
             node.hear_velocities(robot)?;
         }
+        let goals = GoalOrders::new(run.simulation());
+        for robot in goals.robots() {
+            node.hear_goals(robot)?;
+        }
+        let trajectories = TrajectoryOrders::new(run.simulation());
+        for arm in trajectories.arms() {
+            node.hear_trajectories(arm)?;
+        }
         let cycle_s = run.simulation().scenery().cycle_s;
         let cycles_per_s = pace.speed / cycle_s;
         let pacer = Pacer::new(cycles_per_s, Instant::now(), run.cycle());
@@ -77,6 +90,8 @@ impl<'a> RosRun<'a> {
             run,
             topics,
             velocities,
+            goals,
+            trajectories,
             node,
             watcher,
             start,
@@ -104,17 +119,47 @@ impl<'a> RosRun<'a> {
             if has_to_end() {
                 return Err(RosRunError::Interrupted);
             }
-            match self.node.next_input(self.wait()) {
-                Some(RosInput::Request(request)) => self.handle(request)?,
-                Some(RosInput::Velocity { robot, velocity }) => {
-                    self.velocities.receive(robot, velocity, Instant::now());
-                }
-                None => {}
+            if let Some(input) = self.node.next_input(self.wait()) {
+                self.receive(input)?;
             }
             self.tell_malformed_inputs();
             self.advance_to_due_cycle()?;
         }
+        self.tell_refusals();
         Ok(())
+    }
+
+    /// Takes what has come in. The last command of a robot counts, whether it is a velocity or a goal.
+    fn receive(&mut self, input: RosInput) -> Result<(), RosRunError> {
+        match input {
+            RosInput::Request(request) => self.handle(request)?,
+            RosInput::Velocity { robot, velocity } => {
+                self.goals.forget(robot);
+                self.velocities.receive(robot, velocity, Instant::now());
+            }
+            RosInput::Goal { robot, goal } => {
+                if self.goals.receive(self.run.simulation(), robot, &goal) {
+                    self.velocities.forget(robot);
+                }
+            }
+            RosInput::Trajectory { arm, trajectory } => {
+                let run = self.run.simulation();
+                self.trajectories.receive((run, &self.topics), arm, &trajectory);
+            }
+        }
+        Ok(())
+    }
+
+    fn tell_refusals(&self) {
+        let goals = self.goals.refused();
+        let trajectories = self.trajectories.refused();
+        if goals + trajectories > 0 {
+            tracing::warn!(
+                "{goals} goals and {trajectories} trajectories were refused, {} and {} taken",
+                self.goals.accepted(),
+                self.trajectories.accepted()
+            );
+        }
     }
 
     /// Returns the run, to be finished.
@@ -154,18 +199,29 @@ impl<'a> RosRun<'a> {
         self.publish()
     }
 
-    /// Orders the actions of the next cycle that velocities ask for.
+    /// Orders what velocities, goals and trajectories ask for in the next cycle.
     fn give_orders(&mut self) -> Result<(), RosRunError> {
-        let orders = self.velocities.orders(Instant::now());
-        if orders.robots.is_empty() {
+        let by_velocity = self.velocities.orders(Instant::now());
+        self.order(ACTION_ORDER, &by_velocity.robots, &by_velocity.actions)?;
+        let by_goal = self.goals.orders(self.run.simulation());
+        self.order(ACTION_ORDER, &by_goal.robots, &by_goal.actions)?;
+        self.order(TRIP_ORDER, &by_goal.marked, &by_goal.marks)?;
+        for (arm, joints) in self.trajectories.orders(self.run.simulation(), &self.topics) {
+            self.order(JOINTS_ORDER, &[arm], &joints)?;
+        }
+        Ok(())
+    }
+
+    fn order(
+        &mut self,
+        order: &str,
+        agents: &[EntityId],
+        values: &[f64],
+    ) -> Result<(), RosRunError> {
+        if agents.is_empty() {
             return Ok(());
         }
-        let order = MultiAgentOrder {
-            order: ACTION_ORDER,
-            agents: &orders.robots,
-            values: &orders.actions,
-        };
-        let given = self.run.order(&order);
+        let given = self.run.order(&MultiAgentOrder { order, agents, values });
         let bug = "please report it with the scenario: this is a bug";
         given.map_err(|error| Error::other(error.to_string(), bug))?;
         Ok(())
@@ -215,8 +271,10 @@ impl<'a> RosRun<'a> {
     /// With the reason for the client.
     fn reset(&mut self) -> Result<(), String> {
         self.run.restore(&self.start).map_err(|error| error.to_string())?;
-        // Velocities were for where the robots were.
+        // These were for where robots and arms were.
         self.velocities.clear();
+        self.goals.clear();
+        self.trajectories.clear();
         self.restart_clock();
         Ok(())
     }
@@ -230,8 +288,8 @@ impl<'a> RosRun<'a> {
         if malformed > self.told_malformed {
             self.told_malformed = malformed;
             tracing::warn!(
-                "{malformed} requests and velocities were dropped: they have no attachment as rmw_zenoh sends it, or \
-                 their content is no CDR of finite numbers"
+                "{malformed} requests, velocities, goals and trajectories were dropped: they have no attachment as \
+                 rmw_zenoh sends it, or their content is no CDR of finite numbers and of turns"
             );
         }
     }

@@ -8,7 +8,7 @@
 use super::rmw::RosType;
 
 /// The types of the messages of runs and of robots that are driven, by name.
-pub const MESSAGE_TYPES: [RosType; 11] = [
+pub const MESSAGE_TYPES: [RosType; 12] = [
     RosType {
         name: "geometry_msgs/msg/PoseStamped",
         hash: "RIHS01_10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
@@ -48,6 +48,10 @@ pub const MESSAGE_TYPES: [RosType; 11] = [
     RosType {
         name: "tf2_msgs/msg/TFMessage",
         hash: "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
+    },
+    RosType {
+        name: "trajectory_msgs/msg/JointTrajectory",
+        hash: "RIHS01_179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e",
     },
     RosType {
         name: "visualization_msgs/msg/MarkerArray",

@@ -111,6 +111,13 @@ impl VelocityOrders {
         }
     }
 
+    /// Forgets the velocity of a robot.
+    pub fn forget(&mut self, robot: EntityId) {
+        if let Some(robot) = self.robots.get_mut(&robot) {
+            robot.last = None;
+        }
+    }
+
     /// Forgets all velocities.
     pub fn clear(&mut self) {
         self.robots.values_mut().for_each(|robot| robot.last = None);

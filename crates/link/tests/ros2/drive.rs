@@ -28,7 +28,7 @@ const HALL: [&str; 8] = [
 
 const BOX_M: f64 = 0.5;
 const RADIUS_M: f64 = 0.17;
-const DOMAIN: u32 = 11;
+pub(crate) const DOMAIN: u32 = 11;
 
 /// Returns the scenario of robots with these starts and goals, each a column and a row.
 fn scenario(robots: &[([u32; 3], [u32; 2])]) -> String {
@@ -48,11 +48,11 @@ fn scenario(robots: &[([u32; 3], [u32; 2])]) -> String {
 }
 
 /// The plants of a test, in Python. They end with it.
-struct Plants {
+pub(crate) struct Plants {
     child: Child,
     stdin: ChildStdin,
     lines: Receiver<Value>,
-    port: u16,
+    pub(crate) port: u16,
 }
 
 impl Plants {
@@ -60,19 +60,23 @@ impl Plants {
         Self::start_with(starts, json!({ "walls": walls }))
     }
 
-    fn start_with(starts: &[[u32; 3]], more: Value) -> Self {
+    pub(crate) fn start_with(starts: &[[u32; 3]], more: Value) -> Self {
         // Another process may take the port in between; then the plants say so and the test fails.
         let port = {
             let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
             listener.local_addr().expect("an address").port()
         };
-        let mut config = more;
-        config["port"] = port.into();
-        config["domain"] = DOMAIN.into();
-        config["map"] = json!(HALL);
-        config["box_m"] = BOX_M.into();
-        config["radius_m"] = RADIUS_M.into();
-        config["starts"] = json!(starts);
+        let mut config = json!({
+            "port": port,
+            "domain": DOMAIN,
+            "map": HALL,
+            "box_m": BOX_M,
+            "radius_m": RADIUS_M,
+            "starts": starts,
+        });
+        if let (Some(config), Value::Object(more)) = (config.as_object_mut(), more) {
+            config.extend(more);
+        }
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/ros2/plant.py");
         let mut command = Command::new(python());
         command.arg(script).arg(config.to_string()).stdin(Stdio::piped()).stdout(Stdio::piped());
@@ -94,7 +98,7 @@ impl Plants {
         self.lines.recv_timeout(TEST_TIMEOUT).expect("the plants answer")
     }
 
-    fn ask(&mut self, word: &str) -> Value {
+    pub(crate) fn ask(&mut self, word: &str) -> Value {
         writeln!(self.stdin, "{word}").expect("the plants listen");
         self.next()
     }
@@ -108,14 +112,14 @@ impl Drop for Plants {
 }
 
 /// A robot that is driven. It is killed when it is dropped.
-struct DriveProcess {
+pub(crate) struct DriveProcess {
     child: Child,
     stdin: Option<ChildStdin>,
     messages: Receiver<LinkMessage>,
 }
 
 impl DriveProcess {
-    fn start(job: DriveJob) -> Self {
+    pub(crate) fn start(job: DriveJob) -> Self {
         let mut command = link_command(env!("CARGO_BIN_EXE_sidestep-link"));
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn().expect("the program starts");
@@ -158,7 +162,7 @@ impl DriveProcess {
         }
     }
 
-    fn end(&self) -> DriveStatus {
+    pub(crate) fn end(&self) -> DriveStatus {
         loop {
             match self.next() {
                 LinkMessage::Driven(status) => return status,
@@ -189,7 +193,7 @@ impl Drop for DriveProcess {
     }
 }
 
-fn job(file: &Path, robot: u32, port: u16) -> DriveJob {
+pub(crate) fn job(file: &Path, robot: u32, port: u16) -> DriveJob {
     DriveJob {
         common: common_settings(file),
         robot,
@@ -205,6 +209,7 @@ fn job(file: &Path, robot: u32, port: u16) -> DriveJob {
             scan: "scan".into(),
             bumper: "bumper".into(),
             cmd_vel: "cmd_vel".into(),
+            goal: "goal_pose".into(),
             is_stamped: false,
             map_frame: "map".into(),
             base_frame: None,
@@ -221,21 +226,22 @@ fn job(file: &Path, robot: u32, port: u16) -> DriveJob {
         },
         trips: Some(1),
         out: None,
+        bag: None,
         replace: false,
     }
 }
 
 /// A folder with a scenario.
-struct ScenarioFolder(tempfile::TempDir);
+pub(crate) struct ScenarioFolder(tempfile::TempDir);
 
 impl ScenarioFolder {
-    fn new(text: &str) -> Self {
+    pub(crate) fn new(text: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("s.toml"), text).expect("written");
         Self(folder)
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 }
@@ -371,4 +377,62 @@ fn jobs_that_cannot_be_are_refused_with_a_remedy_and_leave_no_table() {
     );
     let talking = fail(job(&talking.path("s.toml"), 0, 9));
     assert!(talking.is_input && talking.cause.contains("radio"), "{talking:?}");
+}
+
+#[test]
+fn a_robot_without_a_program_goes_where_it_is_told_and_its_bag_is_read_by_others() {
+    if !has_modules(PEER) {
+        return;
+    }
+    let text = scenario(&[([0, 0, 0], [11, 0])]);
+    let own = text.find("behaviour").expect("a behavior");
+    let folder =
+        ScenarioFolder::new(&format!("{}behaviour = {{ kind = \"external\" }}\n", &text[..own]));
+    let mut plants = Plants::start_with(&[[0, 0, 0]], json!({ "goals": true }));
+    let bag = folder.path("bag");
+    let job = job(&folder.path("s.toml"), 0, plants.port);
+    let drive = DriveProcess::start(DriveJob { bag: Some(bag.clone()), ..job });
+    let graph = drive.graph();
+    let goals = ("/robot_0/goal_pose".to_string(), "geometry_msgs/msg/PoseStamped".to_string());
+    assert!(graph.topics.contains(&goals), "{graph:?}");
+    // It is measured and stands: nothing guards it anymore.
+    drive.wait_for(|status| status.guarded_by.is_some());
+    drive.wait_for(|status| status.guarded_by.is_none());
+    plants.ask("goal 0 robot_0/odom 2.25 1.25 90");
+    drive.wait_for(|status| status.refused_goals == 1);
+    // In a wall.
+    plants.ask("goal 0 map 1.75 2.25 90");
+    drive.wait_for(|status| status.refused_goals == 2);
+    plants.ask("goal 0 map 2.25 1.25 90");
+    let end = drive.end();
+    assert_eq!((end.trips, end.goals, end.refused_goals), (1, 1, 2), "{end:?}");
+    assert_eq!(end.goal, Some((4, 2)));
+    let report = plants.ask("report");
+    assert!(is_at(&report[0], [4, 2]) && report[0]["touches"] == 0, "{report}");
+    let topics = read_bag(&bag);
+    for (topic, kind) in [
+        ("/robot_0/odom", "nav_msgs/msg/Odometry"),
+        ("/robot_0/scan", "sensor_msgs/msg/LaserScan"),
+        ("/robot_0/bumper", "std_msgs/msg/Bool"),
+        ("/robot_0/cmd_vel", "geometry_msgs/msg/Twist"),
+        ("/robot_0/goal_pose", "geometry_msgs/msg/PoseStamped"),
+        ("/robot_0/sidestep_drive_0/pose", "geometry_msgs/msg/PoseStamped"),
+        ("/tf_static", "tf2_msgs/msg/TFMessage"),
+    ] {
+        assert_eq!(topics[topic]["type"], kind, "{topics}");
+    }
+    assert_eq!(topics["/robot_0/goal_pose"]["count"], 3);
+    assert_eq!(topics["/robot_0/cmd_vel"]["last"]["linear"]["x"], 0.0);
+    let pose = &topics["/robot_0/sidestep_drive_0/pose"]["last"];
+    assert_eq!(pose["header"]["frame_id"], "map");
+    let x_m = pose["pose"]["position"]["x"].as_f64().expect("meters");
+    assert!((x_m - 2.25).abs() < 0.1, "{pose}");
+}
+
+/// Returns what `rosbags` reads from a bag.
+fn read_bag(folder: &Path) -> Value {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/ros2/bag.py");
+    let output = Command::new(python()).arg(script).arg(folder).output().expect("python starts");
+    let error = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {error}"))
 }

@@ -4,6 +4,7 @@
 //! The interpreter is that of SIDESTEP_PYTHON, else `python3`; where it or a package is not here these tests are skipped,
 //! unless SIDESTEP_REQUIRE names `python`.
 
+mod closed_loop;
 mod drive;
 mod process;
 
@@ -264,13 +265,83 @@ fn velocities_from_outside_are_orders_that_are_recorded_and_replay() {
         let turned = if k == 0 { 0.0 } else { yaw_half };
         assert!(is_close(&pose["orientation"]["z"], turned), "{k}: {pose}");
     }
+    assert_replays(&node, &text);
+}
+
+#[test]
+fn a_robot_goes_to_the_last_goal_that_can_be_and_its_run_replays() {
+    if !has_modules(PEER) {
+        return;
+    }
+    let obedient = "effector = \"nomad\"\nbehaviour = { kind = \"external\" }";
+    let text = ROBOT.replace("cycles = 1000000", "cycles = 40").replace("both", "reliable");
+    let text = text.replace("effector = \"nomad\"", obedient);
+    let node = RosProcess::start(&text, |job| Ros2Job {
+        starts_paused: true,
+        out: Some(job.common.flown.file.with_file_name("run")),
+        ..job
+    });
+    let obeys = ("/robot_0/goal_pose".to_string(), "geometry_msgs/msg/PoseStamped".to_string());
+    assert!(node.graph().topics.contains(&obeys), "{:?}", node.graph());
+    let seen = Peer::new(&node, 0, "/").ask("goals");
+    let last = &seen["truth"][39]["pose"];
+    assert_eq!(xyz(&last["position"]), [3.125, 0.625, 0.0], "through the door");
+    assert!(last["orientation"]["z"].as_f64().is_some_and(|z| z.abs() > 0.999), "{last}");
+    let summary = assert_replays(&node, &text);
+    assert_eq!(summary["metrics"]["trips"], 1, "{summary}");
+}
+
+/// An arm of two joints about vertical axes.
+const ARM: &str = "format = 1\nworld = \"chain\"\nseed = 3\ncycles = 30\n[chain]\ndimensions = 3\ndt_s = 0.1\n\
+    [[chains]]\narm = { joints = [0.0, 0.5], urdf_text = \"\"\"<robot name='r'><link name='a'/><link name='b'/>\
+    <link name='c'/><link name='d'/><joint name='turn' type='revolute'><parent link='a'/><child link='b'/>\
+    <origin xyz='0 0 0.2'/><axis xyz='0 0 1'/><limit lower='-3' upper='3' effort='1' velocity='1'/></joint>\
+    <joint name='bend' type='revolute'><parent link='b'/><child link='c'/><origin xyz='0.4 0 0'/><axis xyz='0 0 1'/>\
+    <limit lower='-2' upper='2' effort='1' velocity='1'/></joint>\
+    <joint name='tool' type='fixed'><parent link='c'/><child link='d'/><origin xyz='0.4 0 0'/></joint></robot>\"\"\" }\n\
+    radius_m = 0.03\n[[chains.tasks]]\nkind = \"external\"\nconnector = 2\nspeed_m_s = 2.0\n";
+
+#[test]
+fn an_arm_follows_the_trajectory_that_can_be_and_its_run_replays() {
+    if !has_modules(PEER) {
+        return;
+    }
+    let node = RosProcess::start(ARM, |job| Ros2Job {
+        starts_paused: true,
+        out: Some(job.common.flown.file.with_file_name("run")),
+        ..job
+    });
+    let obeys = (
+        "/chain_0/joint_trajectory".to_string(),
+        "trajectory_msgs/msg/JointTrajectory".to_string(),
+    );
+    assert!(node.graph().topics.contains(&obeys), "{:?}", node.graph());
+    let seen = Peer::new(&node, 0, "/").ask("trajectory");
+    for (k, state) in (1..).zip(seen["joints"].as_array().expect("states")) {
+        assert_eq!(state["name"], json!(["turn", "bend"]));
+        // The trajectory takes two seconds; then the arm rests.
+        let share = (0.1 * f64::from(k) / 2.0).min(1.0);
+        let wanted = [-0.5 * share, 0.5 + 0.5 * share];
+        for joint in 0..2 {
+            let value = state["position"][joint].as_f64().expect("a value");
+            // Joints with limits of acceleration and jerk follow a little later.
+            let tolerance = if k == 30 { 1e-6 } else { 0.1 };
+            assert!((value - wanted[joint]).abs() < tolerance, "step {k}: {state}");
+        }
+    }
+    assert_replays(&node, ARM);
+}
+
+/// Asserts that the folder of a run replays to its digest, and that the scenario alone has another one; returns its summary.
+fn assert_replays(node: &RosProcess, text: &str) -> Value {
     let summary = node.complete();
     let again = sidestep_session::RecordedRun::open(&WORLDS, &node.path("run")).expect("a run");
     let replayed = sidestep_session::replay_all(&again, 1, &sidestep_session::NoWatcher);
     assert!(replayed.is_ok(), "{:?}", replayed.err());
-    let mut alone = started(&text);
-    alone.advance(4);
-    assert_ne!(summary["digest"], alone.digest().to_string(), "without orders it stays");
+    let mut alone = started(text);
+    alone.advance(alone.config().cycles);
+    assert_ne!(summary["digest"], alone.digest().to_string(), "without orders it is another run");
+    summary
 }
 
 #[test]

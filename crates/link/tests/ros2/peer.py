@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 
+import numpy as np
 from rosbags.typesys import Stores, get_typestore
 from zenoh_ros2_sdk import (
     ROS2Publisher,
@@ -220,22 +221,79 @@ def reset_between_steps():
 def velocities():
     """A box ahead, a quarter turn to the left, nothing, and what is no velocity."""
     odom = Topic(f"{NAMESPACE}/robot_0/odom", "nav_msgs/msg/Odometry")
-    twist = "geometry_msgs/msg/Twist"
-    publisher = ROS2Publisher(
-        f"{NAMESPACE}/robot_0/cmd_vel",
-        twist,
-        msg_definition=TYPES.generate_msgdef(twist)[0],
-        type_hash=TYPES.hash_rihs01(twist),
-        **AT,
-    )
-    wait_for("the subscription", lambda: publisher.pub.matching_status.matching)
-    vector = publisher.session_mgr.store.types["geometry_msgs/msg/Vector3"]
+    publisher, types = publisher_of("robot_0/cmd_vel", "geometry_msgs/msg/Twist")
+    vector = types["geometry_msgs/msg/Vector3"]
     run = Services()
     for ahead_m_s, turn_rad_s in [(0.25, 0.0), (0.0, 1.5), (0.01, 0.0), (float("nan"), 0.0)]:
         linear = vector(x=ahead_m_s, y=0.0, z=0.0)
         publisher.publish(linear=linear, angular=vector(x=0.0, y=0.0, z=turn_rad_s))
         run.call("step")
     return {"odom": odom.wait_for(4)}
+
+
+def publisher_of(name, type_name):
+    """A publisher of a topic, once somebody listens."""
+    publisher = ROS2Publisher(
+        f"{NAMESPACE}/{name}",
+        type_name,
+        msg_definition=TYPES.generate_msgdef(type_name)[0],
+        type_hash=TYPES.hash_rihs01(type_name),
+        **AT,
+    )
+    wait_for("the subscription", lambda: publisher.pub.matching_status.matching)
+    return publisher, publisher.session_mgr.store.types
+
+
+def goals():
+    """A goal of another frame, one in a wall, one that is none, two that can be, and 40 steps."""
+    truth = Topic(f"{NAMESPACE}/robot_0/ground_truth", "geometry_msgs/msg/PoseStamped")
+    publisher, types = publisher_of("robot_0/goal_pose", "geometry_msgs/msg/PoseStamped")
+    stamp = types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
+    west = (0.0, 0.0, 1.0, 0.0)
+    for frame, x, y, turn in [
+        ("robot_0/odom", 3.125, 0.625, west),
+        ("map", 1.875, 0.625, west),
+        ("map", 3.125, 0.625, (0.0, 0.0, 0.0, 0.0)),
+        ("map", 1.0, 0.625, west),
+        ("map", 3.125, 0.625, west),
+    ]:
+        point = types["geometry_msgs/msg/Point"](x=x, y=y, z=0.0)
+        orientation = types["geometry_msgs/msg/Quaternion"](*turn)
+        pose = types["geometry_msgs/msg/Pose"](position=point, orientation=orientation)
+        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
+        publisher.publish(header=header, pose=pose)
+    run = Services()
+    for _ in range(40):
+        run.call("step")
+    return {"truth": truth.wait_for(40)}
+
+
+def trajectory():
+    """Three trajectories that cannot be, one that can, and 30 steps."""
+    states = Topic(f"{NAMESPACE}/chain_0/joint_states", "sensor_msgs/msg/JointState")
+    type_name = "trajectory_msgs/msg/JointTrajectory"
+    publisher, types = publisher_of("chain_0/joint_trajectory", type_name)
+    stamp = types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
+    header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+    none = np.array([])
+    for names, values in [
+        (["bend", "wrist"], [1.0, -0.5]),
+        (["bend", "turn"], [1.0, -7.0]),
+        (["bend", "turn"], [1.0]),
+        (["bend", "turn"], [1.0, -0.5]),
+    ]:
+        point = types["trajectory_msgs/msg/JointTrajectoryPoint"](
+            positions=np.array(values),
+            velocities=none,
+            accelerations=none,
+            effort=none,
+            time_from_start=types["builtin_interfaces/msg/Duration"](sec=2, nanosec=0),
+        )
+        publisher.publish(header=header, joint_names=names, points=[point])
+    run = Services()
+    for _ in range(30):
+        run.call("step")
+    return {"joints": states.wait_for(30)}
 
 
 def joints():
@@ -261,6 +319,8 @@ WHAT = {
     "services": services,
     "reset_between_steps": reset_between_steps,
     "velocities": velocities,
+    "goals": goals,
+    "trajectory": trajectory,
     "joints": joints,
     "airplanes": airplanes,
 }

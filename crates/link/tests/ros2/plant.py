@@ -5,11 +5,15 @@ and CDR, and a few lines of physics.
 
 CONFIG is a JSON object: `port`, at which the router listens; `domain`; `map`, rows of `.` and `#` from the north; `box_m`;
 `starts`, a column, a row and a heading in degrees for each robot; `radius_m`; `walls`, further squares that the map of the
-robots does not have, by column and row; `stamped`, whether commands are TwistStamped. Wheels slip, lasers and localization are noisy. Lines on standard input:
+robots does not have, by column and row; `stamped`, whether commands are TwistStamped; `rays` of a laser; `drift_m`, the standard
+deviation of what localization is off, which changes within a quarter of a minute; `pace`, seconds of the robots in a second at most;
+`goals`, whether goals can be sent. Wheels slip, lasers and localization are noisy. Lines on standard input:
 
     silence   stop sending measurements; answers when the last command of each robot is zero
     speak     send them again
     report    answer with what has happened so far
+    track     answer with the true poses, [seconds, x, y, yaw] at each step, of each robot
+    goal ROBOT FRAME X Y DEGREES   send a goal
     end       end
 """
 
@@ -30,7 +34,10 @@ AT = {"domain_id": CONFIG["domain"], "router_port": PORT}
 BOX_M = CONFIG["box_m"]
 RADIUS_M = CONFIG["radius_m"]
 STEP_S = 0.05
-RAYS = 360
+RAYS = CONFIG.get("rays", 360)
+PACE = CONFIG.get("pace", 1.0)
+DRIFT_M = CONFIG.get("drift_m", 0.0)
+DRIFT_S = 15.0
 MAX_RANGE_M = 8.0
 # Of the scanner on its robot.
 MOUNT_M = 0.05
@@ -84,10 +91,14 @@ class Robot:
         self.fastest = [0.0, 0.0]
         self.touches = 0
         self.is_touching = False
+        self.drift = np.zeros(2)
+        self.track = []
         self.odom = topic(ROS2Publisher, f"/{self.name}/odom", "nav_msgs/msg/Odometry")
         self.scan = topic(ROS2Publisher, f"/{self.name}/scan", "sensor_msgs/msg/LaserScan")
         self.bumper = topic(ROS2Publisher, f"/{self.name}/bumper", "std_msgs/msg/Bool")
         kind = "TwistStamped" if CONFIG.get("stamped") else "Twist"
+        if CONFIG.get("goals"):
+            self.goal = topic(ROS2Publisher, f"/{self.name}/goal_pose", "geometry_msgs/msg/PoseStamped")
         self.heard = topic(ROS2Subscriber, f"/{self.name}/cmd_vel", f"geometry_msgs/msg/{kind}", self.on_command)
 
     def on_command(self, message):
@@ -111,6 +122,9 @@ class Robot:
             self.touches += 1
         else:
             self.at = goal
+        # A walk that comes back (of Ornstein and Uhlenbeck).
+        share = STEP_S / DRIFT_S
+        self.drift += RANDOM.normal(0.0, DRIFT_M * math.sqrt(2 * share), 2) - share * self.drift
 
 
 def touches(at, others):
@@ -122,14 +136,16 @@ def touches(at, others):
 
 def ranges(at, yaw, others):
     """What a laser at a place measures: squares by their slabs, robots as discs."""
+    near = np.abs(SQUARES + BOX_M / 2 - at).max(axis=1) < MAX_RANGE_M + BOX_M
+    squares = SQUARES[near]
     angles = yaw + np.arange(RAYS) * (2 * math.pi / RAYS)
     rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        low = (SQUARES[None] - at) / rays[:, None]
-        high = (SQUARES[None] + BOX_M - at) / rays[:, None]
+        low = (squares[None] - at) / rays[:, None]
+        high = (squares[None] + BOX_M - at) / rays[:, None]
     enter = np.minimum(low, high).max(axis=2)
     leave = np.maximum(low, high).min(axis=2)
-    hits = np.where((enter <= leave) & (enter > 0), enter, np.inf).min(axis=1)
+    hits = np.where((enter <= leave) & (enter > 0), enter, np.inf).min(axis=1, initial=np.inf)
     for other in others:
         off = other - at
         along = rays @ off
@@ -177,7 +193,7 @@ class Plant:
 
     def run(self):
         while not self.has_ended:
-            due = time.monotonic() + STEP_S
+            due = time.monotonic() + STEP_S / PACE
             self.advance()
             time.sleep(max(0.0, due - time.monotonic()))
             self.wait_for_commands()
@@ -194,6 +210,8 @@ class Plant:
         for robot in self.robots:
             robot.advance([other.at for other in self.robots if other is not robot])
         self.steps += 1
+        for robot in self.robots:
+            robot.track.append((self.steps * STEP_S, *robot.at, robot.yaw))
         if self.is_silent:
             return
         # Those who join late hear these again: the package has no latched publishers.
@@ -214,7 +232,7 @@ class Plant:
     def send(self, robot):
         messages = Messages(robot.odom.session_mgr.store, self.steps * STEP_S)
         x, y, yaw = robot.start
-        dx, dy = robot.at + RANDOM.normal(0.0, 0.004, 2) - (x, y)
+        dx, dy = robot.at + robot.drift + RANDOM.normal(0.0, 0.004, 2) - (x, y)
         at = (
             math.cos(yaw) * dx + math.sin(yaw) * dy,
             math.cos(yaw) * dy - math.sin(yaw) * dx,
@@ -256,6 +274,18 @@ class Plant:
             time.sleep(0.02)
         return {"velocities": [robot.velocity for robot in self.robots]}
 
+    def send_goal(self, number, frame, *numbers):
+        robot = self.robots[int(number)]
+        publisher = robot.goal
+        until = time.monotonic() + DEADLINE_S
+        while not publisher.pub.matching_status.matching and time.monotonic() < until:
+            time.sleep(0.02)
+        x, y, degrees = map(float, numbers)
+        messages = Messages(publisher.session_mgr.store, self.steps * STEP_S)
+        pose = messages.make("geometry_msgs/msg/Pose", *messages.parts((x, y), math.radians(degrees), "Point"))
+        publisher.publish(header=messages.header(frame), pose=pose)
+        return "sent"
+
     def report(self):
         return [
             {
@@ -291,6 +321,10 @@ def main():
         elif word == "speak":
             plant.is_silent = False
             print(json.dumps("speaks"), flush=True)
+        elif word == "track":
+            print(json.dumps([robot.track for robot in plant.robots]), flush=True)
+        elif word.startswith("goal "):
+            print(json.dumps(plant.send_goal(*word.split()[1:])), flush=True)
         elif word == "report":
             print(json.dumps(plant.report()), flush=True)
         else:

@@ -22,7 +22,7 @@ use sidestep_import::bag::messages::{
 use sidestep_kernel::view::{BodyId, BodyRole, Pose};
 
 /// The fixed frame that the map, the starts and the true poses share.
-const MAP_FRAME: &str = "map";
+pub const MAP_FRAME: &str = "map";
 
 /// The topic of the time of a simulation.
 pub const CLOCK_TOPIC: &str = "/clock";

@@ -98,6 +98,11 @@ impl RunTopics {
         messages
     }
 
+    /// Returns the joints of an arm as its last message told them.
+    pub fn arm_joints(&self, chain: u32) -> Option<&JointValues> {
+        self.joints.arms.iter().find(|arm| arm.number == chain)
+    }
+
     fn lasting_messages(&self, frame: &Frame) -> Vec<RosMessage> {
         let mut messages = Vec::new();
         if let Some(floor) = &self.floor {

@@ -5,7 +5,7 @@ use super::clearance::part_clearance;
 use super::driver::external::{OrderOutcome, Orders};
 use super::driver::{Task, TaskKind, VetoRecord};
 use super::scratch::Scratch;
-use super::state::{ChainBodyState, ChainWorldState};
+use super::state::{ChainBodyState, ChainWorldState, MotionPlan};
 use super::world::{ChainSpec, ChainWorld, OTHER_CHAIN};
 use sidestep_kernel::control::{AgentTeam, AgentTeams, BufferMut, Order, ValueDomain, ValueSpace};
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
@@ -24,12 +24,18 @@ impl<const D: usize> ChainSpec<D> {
     fn has_external_task(&self) -> bool {
         self.tasks.iter().any(takes_orders)
     }
+
+    /// Returns the number of joints of an arm; 0 of other chains.
+    fn joint_count(&self) -> usize {
+        self.arm.as_ref().map_or(0, |arm| arm.serial.variables.len())
+    }
 }
 
 /// Returns whether two chains observe, and may be ordered, alike.
 fn is_same_team<const D: usize>(one: &ChainSpec<D>, other: &ChainSpec<D>) -> bool {
     one.name == other.name
         && one.start.points().len() == other.start.points().len()
+        && one.joint_count() == other.joint_count()
         && one.has_external_task() == other.has_external_task()
 }
 
@@ -60,6 +66,7 @@ impl<const D: usize> ChainWorld<D> {
         if spec.has_external_task() {
             observation_spaces.extend(order_result_spaces::<D>());
             action_spaces = chain_action_spaces::<D>(n);
+            action_spaces.extend(joints_action_space(spec.joint_count()));
         }
         let name = if spec.name.is_empty() { CHAIN.into() } else { spec.name.clone() };
         AgentTeam { name, agents, observation_spaces, action_spaces }
@@ -102,11 +109,22 @@ impl<const D: usize> ChainWorld<D> {
         ]
     }
 
-    /// Returns an error, with the remedy, if no rod of a chain can ever be as an order wants it.
+    /// Returns an error, with the remedy, if no rod and no joint of a chain can ever be as an order wants it.
     pub(super) fn check_possible(&self, order: &Order<'_>) -> Result<(), String> {
-        if self.order_name(order) != Orders::ROD_TO {
-            return Ok(());
+        match self.order_name(order) {
+            Orders::ROD_TO => self.check_rod_possible(order),
+            Orders::JOINTS => self.check_joints_possible(order),
+            _ => Ok(()),
         }
+    }
+
+    fn check_joints_possible(&self, order: &Order<'_>) -> Result<(), String> {
+        let Some(arm) = &self.chains[order.agent as usize].arm else { return Ok(()) };
+        let checked = arm.serial.check_limits(Orders::JOINTS, order.values);
+        checked.map_err(|error| format!("{}; {}", error.cause(), error.remedy()))
+    }
+
+    fn check_rod_possible(&self, order: &Order<'_>) -> Result<(), String> {
         let (first, second) = order.values.split_at(D);
         let first: Point<D> = std::array::from_fn(|i| first[i]);
         let second: Point<D> = std::array::from_fn(|i| second[i]);
@@ -129,8 +147,14 @@ impl<const D: usize> ChainWorld<D> {
 
     /// Records an order in the state of its chain.
     pub(super) fn record_order(&self, state: &ChainWorldState<D>, order: &Order<'_>) {
-        let external = &mut state.body_mut(order.agent as usize).external;
-        external.orders.record(self.order_name(order), order.values);
+        let name = self.order_name(order);
+        let mut body = state.body_mut(order.agent as usize);
+        body.external.orders.record(name, order.values);
+        // A task that takes no orders has plans of its own, which are to be left alone.
+        let takes_orders = self.current_task(order.agent, &body).is_some_and(takes_orders);
+        if name == Orders::JOINTS && takes_orders {
+            body.plan = Some(MotionPlan::Joints([order.values.to_vec()].into()));
+        }
     }
 
     /// Writes a row for each agent of a team, in the order of its spaces.
@@ -288,6 +312,14 @@ fn chain_action_spaces<const D: usize>(n: usize) -> Vec<ValueSpace> {
         ));
     }
     spaces
+}
+
+/// Returns the space of the order to the joints of an arm with so many; none where there are none.
+fn joints_action_space(joints: usize) -> Option<ValueSpace> {
+    let value = ValueDomain::Real { low: -MAX_COORDINATE_M, high: MAX_COORDINATE_M };
+    let meaning = "values of the joints of the arm, in rad or m, toward which all of them go, none faster than it may be and the \
+                   leading connector no faster than its task's speed; what is in the way stops them; like `to_m`, the last target counts";
+    (joints > 0).then(|| ValueSpace::new(Orders::JOINTS, value, meaning).with_shape([joints]))
 }
 
 fn unbounded_real_space() -> ValueDomain {

@@ -4,7 +4,8 @@
 //! nothing between cycles: another process can go on in its place.
 
 use super::decide::{
-    ActionId, Contact, Decision, Memory, Percept, ReceivedMessage, TripEvent, nearest_by_sector,
+    ActionId, Behaviour, Contact, Decision, Memory, Percept, ReceivedMessage, TripEvent,
+    nearest_by_sector,
 };
 use super::effector::STAY;
 use super::purpose;
@@ -89,6 +90,12 @@ impl RobotAgent {
         is_agent.then_some(Self { world, id })
     }
 
+    /// Returns what a robot that follows the orders of a caller can do by a behavior that its caller has for it; none for
+    /// another body.
+    pub(super) fn under_orders(world: Arc<RobotsWorld>, id: EntityId) -> Option<Self> {
+        world.is_external_robot(id).then_some(Self { world, id })
+    }
+
     /// Returns the id of its robot.
     pub fn id(&self) -> EntityId {
         self.id
@@ -99,6 +106,19 @@ impl RobotAgent {
     /// # Errors
     /// When it cannot be one of this robot in this scenario, with the reason.
     pub fn decide(&self, percept: &RobotPercept) -> Result<RobotControl, String> {
+        let model = self.world.robot_model(self.id).ok_or("it is of a body that is no robot")?;
+        self.decide_by(&*model.behaviour, percept)
+    }
+
+    /// Decides by a percept and a behavior.
+    ///
+    /// # Errors
+    /// Those of [`Self::decide`].
+    pub(super) fn decide_by(
+        &self,
+        behaviour: &dyn Behaviour,
+        percept: &RobotPercept,
+    ) -> Result<RobotControl, String> {
         let model = self.world.robot_model(self.id).ok_or("it is of a body that is no robot")?;
         self.check(model, percept)?;
         let sectors = &model.body.sectors;
@@ -115,7 +135,7 @@ impl RobotAgent {
         };
         let mut memory = Memory { words: percept.memory };
         let mut draws = self.world.streams.draws(self.id, percept.cycle, purpose::DECIDE);
-        let decision = model.behaviour.decide(&seen, &mut memory, &mut draws);
+        let decision = behaviour.decide(&seen, &mut memory, &mut draws);
         let is_known = usize::from(decision.action) < model.body.effector.actions.len();
         Ok(RobotControl {
             id: self.id,

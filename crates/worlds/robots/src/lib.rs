@@ -38,6 +38,7 @@ mod errands;
 pub mod exact;
 mod external;
 mod facts;
+pub mod goal_agent;
 mod goal_distances;
 mod grid_team;
 mod import;
@@ -57,6 +58,7 @@ mod ranges;
 mod remarks;
 mod remote_agents;
 mod reports;
+mod routes;
 pub mod rows;
 mod run_plan;
 pub mod scenario;
@@ -230,6 +232,8 @@ pub struct Scratch {
     motion_samples: Vec<MotionSample>,
     /// The percepts of robots in their order of deciding, where these decide outside of the run.
     percept_log: Option<Vec<agents::RobotPercept>>,
+    /// Whether that has robots that follow the orders of a caller, rather than the others.
+    logs_external: bool,
 }
 
 impl Phases for RobotsWorld {

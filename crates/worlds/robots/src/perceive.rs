@@ -89,7 +89,8 @@ impl<T: OccupantWord> CycleContext<'_, T> {
             heading: body.facing.get().heading(),
             heard: &scratch.heard,
         };
-        if let Some(log) = scratch.percept_log.as_mut().filter(|_| !model.is_external) {
+        let is_logged = model.is_external == scratch.logs_external;
+        if let Some(log) = scratch.percept_log.as_mut().filter(|_| is_logged) {
             log.push(RobotPercept::new(&percept, memory));
         }
         let mut draws = self.world.streams.draws(body.id, self.now, purpose::DECIDE);

@@ -19,6 +19,7 @@ use super::submitted_controls::SubmittedControls;
 use super::world::RobotsWorld;
 use sidestep_kernel::control::OrderError;
 use sidestep_kernel::{Cycle, EntityId, EntitySlot};
+use sidestep_planners::GridPose;
 use std::collections::BTreeMap;
 
 impl RobotsWorld {
@@ -50,6 +51,45 @@ impl RobotsWorld {
         let mut percepts = scratch.percept_log.unwrap_or_default();
         percepts.sort_unstable_by_key(|percept| percept.id);
         percepts
+    }
+
+    /// Returns the percepts of some robots that follow the orders of a caller, of those among them that act in the cycle
+    /// to come, `now`, in their order. The state does not change.
+    pub fn external_percepts(
+        &self,
+        state: &RobotsState,
+        now: Cycle,
+        robots: &[EntityId],
+    ) -> Vec<RobotPercept> {
+        let trial = state.trial_copy(self);
+        let mut scratch = Scratch {
+            percept_log: Some(Vec::new()),
+            logs_external: true,
+            // Without, robots under orders do not look.
+            keep_readings: true,
+            ..Scratch::default()
+        };
+        with_cycle!(self, &trial, now, |cycle| {
+            for &id in robots.iter().filter(|&&id| self.is_external_robot(id)) {
+                cycle.perceive(trial.slot_of_id[id as usize], &mut scratch);
+            }
+        });
+        scratch.percept_log.unwrap_or_default()
+    }
+
+    /// Returns the boxes and the heading of a body.
+    pub fn place(&self, state: &RobotsState, id: EntityId) -> Option<GridPose> {
+        if id as usize >= self.bodies.len() {
+            return None;
+        }
+        let body = state.body(id);
+        let at = self.map_position(body.position());
+        Some(GridPose::new(at.0, at.1, body.facing.get().heading()))
+    }
+
+    /// Returns whether the behavior of a robot is to follow the orders of a caller; robots of a planner have another one.
+    pub fn is_external_robot(&self, id: EntityId) -> bool {
+        self.robot_model(id).is_some_and(|model| model.behaviour.is_external())
     }
 
     /// Reads the control of a robot for cycle `now`.

@@ -3,12 +3,13 @@
 use super::desired_move::DesiredMove;
 use super::initiator::{move_initiator, wait_for_escape};
 use super::lookahead;
-use super::orders::{StepOptions, execute_ordered_motion};
+use super::orders::{StepOptions, complete_joint_result, execute_ordered_motion, find_joint_order};
 use super::plan::{follow_plan, next_waypoint};
 use super::task_moves::{InitiatorContext, desired_move};
 use super::tasks::{start_next_task, task_end_event};
 use super::wheels::{drive_on_wheels, turn_robot};
 use super::{ChainContext, ChainCycleState, Initiator};
+use crate::driver::TaskKind;
 use crate::driver::step_motion::StepMotion;
 use crate::state::ChainBodyState;
 use crate::trace::IntendedMove;
@@ -44,7 +45,14 @@ pub(super) fn run_task_cycle<const D: usize>(
     acting.sink.record_in_trace(|trace| trace.intended = Some(wanted));
     let options =
         StepOptions { gives_way: outcome.gives_way, goes_far: lead_context.inputs.orders.goes_far };
+    let joint_order = find_joint_order(initiator, acting.body, lead_context.inputs.orders);
     execute(initiator, acting, desired, options);
+    if let Some(order) = &joint_order {
+        complete_joint_result(initiator, acting.body, order);
+    } else if matches!(task.driver, TaskKind::External) {
+        // Of an order to joints in the place of which another one came.
+        acting.body.plan = None;
+    }
     if let DesiredMove::Obey(step) = desired {
         outcome.step = Some(step);
     }

@@ -1,14 +1,16 @@
 //! Orders of an external caller for one cycle, and their result.
 
 use super::joints::ArmJointSolver;
+use super::plan::next_waypoint;
 use super::situation::out_of_range_veto;
 use super::{ChainContext, ChainCycleState, Initiator};
+use crate::driver::TaskKind;
 use crate::driver::external::{OrderOutcome, Orders, Target};
 use crate::driver::step_motion::StepMotion;
 use crate::motion::recovery::RecoveryOutcome;
 use crate::motion::request::{execute_request, find_speed_veto, max_cycle_step_m};
-use crate::state::ChainBodyState;
-use sidestep_rods::geometry::{convert_dimensions, norm, normalized, sub};
+use crate::state::{ChainBodyState, MotionPlan};
+use sidestep_rods::geometry::{Point, convert_dimensions, norm, normalized, sub};
 use sidestep_rods::{
     Chain, MotionOutcome, MotionRequest, RequestSource, RequestedMotion, Veto, VetoEffect,
 };
@@ -53,8 +55,54 @@ pub(super) fn motion_from_orders<const D: usize>(
             let i = rod.map_or(agent.min(last), |i| i as usize);
             RequestedMotion::Rod { i, to: to.map(convert_dimensions) }
         }
+        // Joints follow a plan.
+        Target::Joints => return None,
     };
     Some(StepMotion::new(chain, &motion, initiator.step_m()))
+}
+
+/// An order to the joints of an arm.
+pub(super) struct JointOrder<const D: usize> {
+    /// Where the leading connector is when they are there.
+    to: Point<D>,
+    /// Their values before the cycle.
+    before: Vec<f64>,
+    ordered: Vec<f64>,
+}
+
+/// Returns the order to joints of this cycle, if there is one.
+pub(super) fn find_joint_order<const D: usize>(
+    initiator: Initiator<'_, D>,
+    body: &ChainBodyState<D>,
+    orders: Orders,
+) -> Option<JointOrder<D>> {
+    let is_ordered = matches!(initiator.task.driver, TaskKind::External)
+        && orders.target == Some(Target::Joints);
+    let Some(MotionPlan::Joints(path)) = body.plan.as_ref().filter(|_| is_ordered) else {
+        return None;
+    };
+    let to = next_waypoint(initiator, body)?;
+    Some(JointOrder { to, before: body.joints.clone()?, ordered: path.front()?.clone() })
+}
+
+/// Completes the result of an order to joints. An order is for one cycle: what is left of its way is no plan.
+pub(super) fn complete_joint_result<const D: usize>(
+    initiator: Initiator<'_, D>,
+    body: &mut ChainBodyState<D>,
+    order: &JointOrder<D>,
+) {
+    let has_plan = body.plan.take().is_some();
+    let has_moved = body.joints.as_ref().is_some_and(|joints| *joints != order.before);
+    let answer = &mut body.external.answer;
+    answer.target_m = [convert_dimensions(order.to); 2];
+    answer.reached_m = convert_dimensions(body.chain.points()[initiator.task.agent]);
+    answer.outcome = match () {
+        () if has_moved || order.before == order.ordered => OrderOutcome::Moved,
+        // A plan that is left is one that is not blocked: the joints escape from something, or have to stop first.
+        () if has_plan => OrderOutcome::Waited,
+        () => OrderOutcome::Vetoed,
+    };
+    answer.done_share = if answer.outcome == OrderOutcome::Moved { 1.0 } else { 0.0 };
 }
 
 #[derive(Clone, Copy)]

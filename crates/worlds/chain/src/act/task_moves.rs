@@ -11,7 +11,7 @@ use super::plan::plan_if_stuck;
 use super::tasks::{complete_target, is_last_target};
 use super::wheels::NavigatedChain;
 use super::{ChainCycleState, Initiator};
-use crate::driver::external::Orders;
+use crate::driver::external::{Orders, Target};
 use crate::driver::own_driver::DriverAction;
 use crate::driver::{Targets, TaskKind, Wander, wander_direction};
 use crate::script::ScriptMotion;
@@ -54,6 +54,7 @@ pub(super) fn desired_move<const D: usize>(
     let CycleInputs { decision, orders } = lead_context.inputs;
     match &initiator.task.driver {
         TaskKind::Rest => DesiredMove::Rest,
+        TaskKind::External if orders.target == Some(Target::Joints) => DesiredMove::Follow,
         TaskKind::External => motion_from_orders(initiator, &acting.body.chain, orders)
             .map_or(DesiredMove::Rest, DesiredMove::Obey),
         TaskKind::Navigate(navigator) => {

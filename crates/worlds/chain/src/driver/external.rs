@@ -31,6 +31,8 @@ pub(crate) enum Target {
     Connector([f64; 3]),
     /// Both ends of a rod.
     Rod([[f64; 3]; 2]),
+    /// Joints of an arm: their values are the only posture of its plan.
+    Joints,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -96,6 +98,8 @@ impl Orders {
     pub(crate) const ROD: &str = "rod";
     /// The order that gives the targets of its ends.
     pub(crate) const ROD_TO: &str = "rod_to_m";
+    /// The order that gives the values of the joints of an arm.
+    pub(crate) const JOINTS: &str = "joints";
     /// The order that gives the effect of a veto on the way.
     pub(crate) const REACH: &str = "reach";
 
@@ -107,6 +111,7 @@ impl Orders {
                 let (first, second) = ends.split_at(ends.len() / 2);
                 self.target = Some(Target::Rod([in_space(first), in_space(second)]));
             }
+            (Self::JOINTS, _) => self.target = Some(Target::Joints),
             (Self::CONNECTOR, &[k]) => self.connector = Some(k as u32),
             (Self::ROD, &[k]) => self.rod = Some(k as u32),
             (_, values) => self.goes_far = values == [1.0],

@@ -2,16 +2,18 @@
 
 use super::DriveVelocity;
 use super::controller::{ActionOutcome, ActionProgress, Controller, DriveLimits, DriveState};
-use super::grid::{BodyGrid, GridLocalizer};
+use super::grid::{BodyGrid, GridLocalizer, Pose2};
 use super::guard::{Guard, GuardCause, GuardCounts, GuardLimits, GuardView};
 use super::percept::{PerceptBuilder, RobotSituation};
 use super::plan::{ActionPlanner, GridMotion};
 use super::scan::RangeScan;
-use crate::agents::RobotAgent;
+use crate::agents::{RobotAgent, RobotControl, RobotPercept};
 use crate::decide::{ActionId, Contact, TripEvent};
+use crate::goal_agent::{GoalAgent, GoalRefusal};
 use crate::world::RobotsWorld;
 use sidestep_kernel::{Cycle, EntityId};
 use sidestep_planners::GridPose;
+use std::fmt;
 use std::sync::Arc;
 
 /// An action that a robot has carried out.
@@ -48,10 +50,61 @@ pub struct DriveCounts {
     pub guard: GuardCounts,
 }
 
+/// What decides for a robot.
+#[derive(Debug)]
+enum DriveProgram {
+    /// The behavior of the scenario.
+    Own(RobotAgent),
+    /// Goals from outside.
+    Goals(Box<GoalAgent>),
+}
+
+impl DriveProgram {
+    fn new(world: &Arc<RobotsWorld>, id: EntityId) -> Option<Self> {
+        if let Some(agent) = RobotAgent::new(world.clone(), id) {
+            return Some(Self::Own(agent));
+        }
+        GoalAgent::new(world.clone(), id).map(|agent| Self::Goals(Box::new(agent)))
+    }
+
+    /// Returns whether there is nothing that it could decide.
+    fn is_idle(&self) -> bool {
+        matches!(self, Self::Goals(agent) if agent.goal().is_none())
+    }
+
+    fn decide(&mut self, percept: &RobotPercept) -> Result<RobotControl, String> {
+        match self {
+            Self::Own(agent) => agent.decide(percept),
+            Self::Goals(agent) => agent.decide(percept),
+        }
+    }
+}
+
+/// The reason why a robot that is driven does not take a goal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DriveGoalRefusal {
+    /// It decides by a behavior of its own.
+    OwnProgram,
+    /// Where it stands is not known yet.
+    NoPlace,
+    /// It cannot get there.
+    Goal(GoalRefusal),
+}
+
+impl fmt::Display for DriveGoalRefusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OwnProgram => write!(f, "the robot decides by a behavior of its own"),
+            Self::NoPlace => write!(f, "where the robot stands is not known yet"),
+            Self::Goal(refusal) => refusal.fmt(f),
+        }
+    }
+}
+
 /// The program of a robot, and all that it takes to drive by it.
 #[derive(Debug)]
 pub struct Driver {
-    agent: RobotAgent,
+    program: DriveProgram,
     grid: BodyGrid,
     localizer: GridLocalizer,
     percepts: PerceptBuilder,
@@ -102,19 +155,20 @@ impl Driver {
         };
         check_is_alone(world, id)?;
         let no_program = || {
-            let cause = format!("robot {id} follows the orders of a caller, and decides nothing");
-            let remedy =
-                "give its section a behavior of its own, e.g. behaviour = { kind = \"wander\" }";
-            (cause, remedy.to_string())
+            let cause = format!("robot {id} has no program");
+            (
+                cause,
+                "give its section a behavior, e.g. behaviour = { kind = \"wander\" }".to_string(),
+            )
         };
-        let agent = RobotAgent::new(world.clone(), id).ok_or_else(no_program)?;
+        let program = DriveProgram::new(world, id).ok_or_else(no_program)?;
         let percepts = PerceptBuilder::new(world, id).ok_or_else(no_program)?;
         let planner = ActionPlanner::new(world, id).map_err(|cause| {
             let remedy = "a robot with two wheels goes ahead or back and turns; give it such an effector, e.g. nomad";
             (cause, remedy.to_string())
         })?;
         Ok(Self {
-            agent,
+            program,
             localizer: GridLocalizer::new(grid.clone()),
             guard: Guard::new(guard, grid.clone()),
             grid,
@@ -133,6 +187,24 @@ impl Driver {
     /// Returns the percepts' builder, which knows the beams of the scenario.
     pub fn percepts(&self) -> &PerceptBuilder {
         &self.percepts
+    }
+
+    /// Returns whether it goes where it is told ([`Self::set_goal`]).
+    pub fn takes_goals(&self) -> bool {
+        matches!(self.program, DriveProgram::Goals(_))
+    }
+
+    /// Takes a pose in the frame of the map as its goal, in place of the one before. An action that is under way is
+    /// completed first.
+    ///
+    /// # Errors
+    /// When it takes none, or cannot get there; the goal before stays then.
+    pub fn set_goal(&mut self, pose: &Pose2) -> Result<GridPose, DriveGoalRefusal> {
+        let DriveProgram::Goals(agent) = &mut self.program else {
+            return Err(DriveGoalRefusal::OwnProgram);
+        };
+        let from = self.localizer.present().ok_or(DriveGoalRefusal::NoPlace)?;
+        agent.set_goal(from, pose).map_err(DriveGoalRefusal::Goal)
     }
 
     /// Returns the number of the next decision.
@@ -167,7 +239,9 @@ impl Driver {
                 ActionProgress::Done(outcome) => ended = self.end_action(outcome, at),
             }
         }
-        self.begin_action(state, scan, at)?;
+        if !self.program.is_idle() {
+            self.begin_action(state, scan, at)?;
+        }
         Ok(self.guarded(DriveVelocity::ZERO, ended, &view))
     }
 
@@ -223,7 +297,7 @@ impl Driver {
             contact: self.contact,
             memory: self.memory,
         };
-        let control = self.agent.decide(&self.percepts.percept(&situation, scan))?;
+        let control = self.program.decide(&self.percepts.percept(&situation, scan))?;
         self.memory = control.memory;
         self.counts.trips += u64::from(control.trip == Some(TripEvent::Completed));
         let plan = self.planner.plan(control.action, at);

@@ -145,6 +145,11 @@ impl GridLocalizer {
         Self { grid, present: None }
     }
 
+    /// Returns the boxes and the heading by the last pose; none off the map, and before the first one.
+    pub fn present(&self) -> Option<GridPose> {
+        self.present
+    }
+
     /// Returns the boxes and the heading by a pose in the frame of the map; none off the map.
     pub fn update(&mut self, pose: &Pose2) -> Option<GridPose> {
         let nearest = self.grid.nearest(pose);

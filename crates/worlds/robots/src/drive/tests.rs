@@ -1,6 +1,6 @@
 use super::DriveVelocity;
 use super::controller::{DriveLimits, DriveState};
-use super::driver::{DrivenAction, Driver};
+use super::driver::{DriveGoalRefusal, DrivenAction, Driver};
 use super::grid::{BodyGrid, GridLocalizer, Pose2};
 use super::guard::{Guard, GuardCause, GuardLimits, GuardView};
 use super::percept::{PerceptBuilder, RobotSituation};
@@ -249,19 +249,26 @@ impl Floor {
     fn new(text: &str) -> Self {
         let run = run(text);
         let world = run.world().clone();
-        let mut plants = Vec::new();
+        let mut drivers = Vec::new();
         for percept in run.world().percepts_in_cycle(run.state(), 0) {
             let grid = BodyGrid::new(&world, percept.id).expect("a robot");
             let at = GridPose { col: percept.at.0, row: percept.at.1, heading: percept.heading };
             let driver = Driver::new(&world, percept.id, LIMITS, GUARD).expect("it can drive");
-            let velocity = DriveVelocity::ZERO;
-            plants.push(Plant { driver, pose: grid.center(at), velocity, ended: Vec::new() });
+            drivers.push((driver, grid.center(at)));
         }
+        Self::of_plants(&world, drivers)
+    }
+
+    fn of_plants(world: &RobotsWorld, drivers: Vec<(Driver, Pose2)>) -> Self {
+        let velocity = DriveVelocity::ZERO;
+        let plants = drivers.into_iter();
+        let plants =
+            plants.map(|(driver, pose)| Plant { driver, pose, velocity, ended: Vec::new() });
         Self {
-            squares: wall_squares(&world),
+            squares: wall_squares(world),
             side_m: world.map.box_size_m,
             discs: Vec::new(),
-            plants,
+            plants: plants.collect(),
             noise: Noise(7),
             time_s: 0.0,
             is_blind: false,
@@ -481,4 +488,34 @@ fn robots_that_are_not_alone_or_go_sideways_are_refused() {
          [[robots]]\nat = [[3, 8, 1]]\neffector = \"crab\"\n",
     );
     assert!(refused(&sideways, 0).contains("sideways"));
+}
+
+#[test]
+fn a_robot_under_orders_is_driven_to_goals_from_outside_and_stands_without_one() {
+    let text = scenario("[[robots]]\nat = [[2, 1, 0]]\nbehaviour = { kind = \"external\" }\n");
+    let world = world(&text);
+    let grid = BodyGrid::new(&world, 0).expect("a robot");
+    let mut driver = Driver::new(&world, 0, LIMITS, GUARD).expect("it can drive");
+    assert!(driver.takes_goals());
+    let goal = Pose2 { at_m: [2.3, 1.2], yaw_rad: PI / 2.0 };
+    assert_eq!(driver.set_goal(&goal), Err(DriveGoalRefusal::NoPlace));
+    let pose = grid.center(GridPose { col: 2, row: 1, heading: 0 });
+    let mut floor = Floor::of_plants(&world, vec![(driver, pose)]);
+    floor.advance(100);
+    assert_eq!(floor.plants[0].driver.counts().actions, 0, "it waits, which is no action");
+    assert!(hypot(floor.plants[0].pose.at_m[0] - pose.at_m[0], 0.0) < 1e-9);
+    let driver = &mut floor.plants[0].driver;
+    let wall = driver.set_goal(&Pose2 { at_m: [3.2, 3.7], yaw_rad: 0.0 });
+    assert!(matches!(wall, Err(DriveGoalRefusal::Goal(_))), "{wall:?}");
+    assert_eq!(driver.set_goal(&goal), Ok(GridPose { col: 4, row: 2, heading: 1 }));
+    floor.advance(1200);
+    let plant = &floor.plants[0];
+    assert_eq!((plant.driver.counts().trips, floor.touches), (1, 0));
+    let target = grid.center(GridPose { col: 4, row: 2, heading: 1 });
+    let off = [0, 1].map(|k| plant.pose.at_m[k] - target.at_m[k]);
+    assert!(hypot(off[0], off[1]) < 0.1 && wrap_angle(plant.pose.yaw_rad - PI / 2.0).abs() < 0.1);
+    let own =
+        Driver::new(&self::world(&scenario("[[robots]]\nat = [[2, 1, 0]]\n")), 0, LIMITS, GUARD);
+    let own = own.expect("it can drive").set_goal(&goal);
+    assert_eq!(own, Err(DriveGoalRefusal::OwnProgram));
 }

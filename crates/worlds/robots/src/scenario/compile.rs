@@ -31,8 +31,8 @@ use super::{
 };
 use crate::action::{Action, own_boxes};
 use crate::decide::{
-    Announce, Avoidance, Behaviour, Errands, External, Goto, Memory, Planner, Replay, Sector,
-    SensorTrust, Shuttle, StallDetector, Wander,
+    Announce, Avoidance, Behaviour, Errands, External, Goto, Memory, Replay, Sector, SensorTrust,
+    Shuttle, StallDetector, Wander,
 };
 use crate::effector::{ActionId, EffectorModel, FORWARD, MAX_PATH_STEPS, ObstacleRule, Transition};
 use crate::errand_fields::MAX_WATCHED_BOXES;

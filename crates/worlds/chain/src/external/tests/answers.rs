@@ -3,6 +3,7 @@
 use super::{name, observed, order, plane, source};
 use crate::chain_run;
 use sidestep_kernel::Simulation;
+use sidestep_kernel::control::MultiAgentOrder;
 
 /// A chain under orders in front of a disc that begins at x = 0.7; its last connector is fixed or not.
 fn facing_a_disc(more: &str) -> crate::ChainRun<2> {
@@ -175,4 +176,58 @@ fn an_arm_in_space_is_led_out_to_its_reach() {
     );
     assert_eq!((seen["veto_part"][0], seen["joints_m"].len()), (0.0, 9));
     assert!(seen["joints_m"][7] > 0.8, "{:?}", seen["joints_m"]);
+}
+
+/// An arm of two joints about parallel axes, each of which turns by 0.1 rad in a cycle at most, and a wall of its own.
+const ARM: &str = "[chain]\ndimensions = 3\ndt_s = 0.1\n[[obstacles]]\nat_m = [0.0, 0.8, 0.2]\nradius_m = 0.2\n\
+    [[chains]]\narm = { joints = [0.0, 0.5], urdf_text = \"\"\"<robot name='r'><link name='a'/><link name='b'/><link name='c'/>\
+    <link name='d'/><joint name='turn' type='revolute'><parent link='a'/><child link='b'/><origin xyz='0 0 0.2'/>\
+    <axis xyz='0 0 1'/><limit lower='-3' upper='3' effort='1' velocity='1'/></joint>\
+    <joint name='bend' type='revolute'><parent link='b'/><child link='c'/><origin xyz='0.4 0 0'/>\
+    <axis xyz='0 0 1'/><limit lower='-2' upper='2' effort='1' velocity='1'/></joint>\
+    <joint name='tool' type='fixed'><parent link='c'/><child link='d'/><origin xyz='0.4 0 0'/></joint></robot>\"\"\" }\n\
+    radius_m = 0.03\n[[chains.tasks]]\nkind = \"external\"\nconnector = 2\nspeed_m_s = 2.0\n";
+
+fn joints(run: &mut dyn Simulation) -> Vec<f64> {
+    use sidestep_kernel::view::FrameOptions;
+    run.enable_odometry();
+    run.frame(FrameOptions::WITHOUT_SCANS)
+        .joints
+        .first()
+        .map_or(Vec::new(), |arm| arm.values.clone())
+}
+
+#[test]
+fn the_joints_of_an_arm_go_where_they_are_ordered_within_their_rates_and_stop_before_things() {
+    let run = &mut *chain_run(&source(ARM), 1).unwrap_or_else(|error| panic!("{error}"));
+    let wanted = [-0.5, 1.0];
+    let mut before = joints(run);
+    assert_eq!(before, [0.0, 0.5]);
+    for _ in 0..30 {
+        order(run, "joints", 0, &wanted);
+        run.advance(1);
+        let now = joints(run);
+        assert!(now.iter().zip(&before).all(|(a, b)| (a - b).abs() < 0.1 + 1e-9), "{now:?}");
+        before = now;
+    }
+    assert_eq!(before, wanted);
+    assert_eq!(name(run, 0, "answer"), "moved");
+    assert_eq!(observed(run, 0)["done_share"], [1.0]);
+    // Without a new order they stay, and an order of another sort is no order to joints.
+    run.advance(3);
+    order(run, "joints", 0, &[0.0, 0.0]);
+    order(run, "to_m", 0, &[0.6, -0.4, 0.2]);
+    run.advance(1);
+    assert_ne!(name(run, 0, "answer"), "no-order");
+    // The ball is in the way of a quarter turn.
+    for _ in 0..60 {
+        order(run, "joints", 0, &[1.8, 0.0]);
+        run.advance(1);
+    }
+    assert_eq!(name(run, 0, "answer"), "vetoed");
+    assert!(joints(run)[0] < 1.5 && joints(run)[0] > 0.5, "{:?}", joints(run));
+    assert_eq!(run.agent_metrics()[0]["penetrations"], 0);
+    let beyond = MultiAgentOrder { order: "joints", agents: &[0], values: &[3.5, 0.0] };
+    let refused = run.order(&beyond).expect_err("beyond its limits").to_string();
+    assert!(refused.contains("turn"), "{refused}");
 }

@@ -6,8 +6,8 @@ use super::random::UnlocatedError;
 use super::unused_keys::BEHAVIOURS;
 use super::*;
 use crate::delay::Delays;
+use crate::routes::RoutePlanner;
 use sidestep_import::movingai::{ScenRow, load_scen};
-use sidestep_map::planning::Lanes;
 
 impl Compiler<'_> {
     pub(super) fn robots(
@@ -71,7 +71,7 @@ impl Compiler<'_> {
         let team = self.team(s, &body.effector)?;
         let has_planner = team.is_some();
         let team_orders = team.as_ref().and_then(|team| team.leader.orders);
-        let routes = RoutePlanner::new(&self.map, size, None, &body, has_planner);
+        let routes = route_planner(&self.map, size, None, &body, has_planner);
         let alone = (!has_planner).then(|| self.avoidance(None, &routes, &body));
         let mut places = Vec::new();
         let mut types = Vec::new();
@@ -242,12 +242,8 @@ impl Compiler<'_> {
     ) -> Avoidance {
         match section.unwrap_or_default() {
             AvoidanceSection::Plan => {
-                let walls = Arc::clone(&routes.free);
-                let size = routes.size;
                 let box_size_m = self.map.box_size_m;
-                let wheels_err =
-                    !self.file.regime.has_reliable_effectors() && body.effector.has_errors();
-                Avoidance::Plan(Arc::new(Planner::new(walls, size, body, box_size_m, wheels_err)))
+                Avoidance::Plan(Arc::new(routes.planner(body, box_size_m, self.file.regime)))
             }
             AvoidanceSection::Avoid => Avoidance::Sidestep(SensorTrust::OneBeam),
             AvoidanceSection::Filter => Avoidance::Sidestep(SensorTrust::TwoReports),
@@ -262,35 +258,17 @@ impl Compiler<'_> {
     }
 }
 
-/// Finds the shortest paths of robots of one size to any goal.
-struct RoutePlanner {
-    free: Arc<FreeSpace>,
+/// Returns the ways of robots with a body, for a rule by which they get past obstacles.
+fn route_planner(
+    map: &GridMap,
     size: u32,
-    /// Lanes that the paths keep to; none for robots that do not plan, or see nobody who comes.
-    lanes: Option<Arc<Lanes>>,
-}
-
-impl RoutePlanner {
-    fn new(
-        map: &GridMap,
-        size: u32,
-        avoidance: Option<AvoidanceSection>,
-        body: &RobotBody,
-        has_planner: bool,
-    ) -> Self {
-        let free = Arc::new(FreeSpace::from_map(map));
-        let is_planned = avoidance.unwrap_or_default() == AvoidanceSection::Plan;
-        let has_lanes = is_planned && !has_planner && !body.sensors.is_empty();
-        let lanes = has_lanes.then(|| Arc::new(Lanes::new(&free, size)));
-        Self { free, size, lanes }
-    }
-
-    fn to_nearest(&self, goals: &[(u32, u32)]) -> FlowField {
-        match &self.lanes {
-            Some(lanes) => FlowField::along_lanes(&self.free, self.size, goals, lanes),
-            None => FlowField::to_nearest(&self.free, self.size, goals),
-        }
-    }
+    avoidance: Option<AvoidanceSection>,
+    body: &RobotBody,
+    has_planner: bool,
+) -> RoutePlanner {
+    let is_planned = avoidance.unwrap_or_default() == AvoidanceSection::Plan;
+    let has_lanes = is_planned && !has_planner && !body.sensors.is_empty();
+    RoutePlanner::new(map, size, has_lanes)
 }
 
 /// The robots of one section, for which a behavior is made.
@@ -361,7 +339,7 @@ impl BehaviourBuilder<'_, '_> {
     fn routes(&self) -> RoutePlanner {
         let RobotKind { size, body, has_planner } = self.robot;
         let avoidance = self.section.get_ref().avoidance;
-        RoutePlanner::new(&self.compiler.map, size, avoidance, body, has_planner)
+        route_planner(&self.compiler.map, size, avoidance, body, has_planner)
     }
 
     /// Returns the way past obstacles to regions; a planner chooses among those of their boxes where the body fits.
