@@ -360,7 +360,8 @@ impl Master {
             }
             return;
         }
-        if base > order.base {
+        let can_begin = order.has_unique_end(&vehicle.route, vehicle.progress);
+        if base > order.base && can_begin {
             order.message_first = order.base;
             order.base = base;
             order.horizon = horizon;

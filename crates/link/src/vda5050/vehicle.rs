@@ -121,6 +121,14 @@ impl OrderInWork {
         2 * (node - self.first) as u32
     }
 
+    /// Returns whether the end of the base is at another place than all nodes before it at which a vehicle may be that has
+    /// reported a node. Else no update may begin there: a vehicle that has started again takes an update for an order, and
+    /// begins it where it stands. On a route that passes a place twice, it would leave out what is between.
+    pub(super) fn has_unique_end(&self, route: &Route, reported: usize) -> bool {
+        let end = route.nodes[self.base].position;
+        route.nodes[reported.min(self.base)..self.base].iter().all(|node| node.position != end)
+    }
+
     /// Returns the node of the route with a sequence number, if it is part of the base.
     fn node_in_base(&self, sequence_id: u32) -> Option<usize> {
         let node = self.first + sequence_id as usize / 2;

@@ -272,7 +272,7 @@ impl Hall {
                 self.orders[number].remove(0);
             }
             17 if what.which.is_multiple_of(4) => {
-                self.orders[number].clear();
+                // Orders that are on their way arrive all the same.
                 self.trucks[number].restart();
                 self.connect(number);
             }
@@ -611,4 +611,53 @@ fn a_cancellation_goes_to_all_with_an_order_and_is_repeated_until_it_is_confirme
     let sent = hall.master.take_outgoing();
     assert_eq!(sent.len(), 1, "no orders, and nothing to the one that has confirmed: {sent:?}");
     assert_eq!(sent[0].topic, "uagv/v2/acme/t0/instantActions");
+}
+
+/// A route that passes column 1 of row 0 twice, whose last two nodes are released one after the other as another vehicle goes.
+fn hall_with_a_return() -> Hall {
+    let node = |position, after| RouteNode { position, after };
+    let before = |node| vec![Predecessor { vehicle: 1, node }];
+    let there_and_back = vec![
+        node((0, 0), vec![]),
+        node((1, 0), vec![]),
+        node((2, 0), vec![]),
+        node((1, 0), before(1)),
+        node((1, 1), before(2)),
+    ];
+    let elsewhere = [(4, 3), (4, 2), (4, 1)].map(|position| node(position, vec![]));
+    Hall::new(&[
+        Route { size: 1, nodes: there_and_back },
+        Route { size: 1, nodes: elsewhere.into() },
+    ])
+}
+
+/// Drives to the next node, and reports it.
+fn drive_on(hall: &mut Hall, number: usize) {
+    hall.trucks[number].drive();
+    hall.trucks[number].drive();
+    report(hall, number);
+}
+
+#[test]
+fn an_update_begins_nowhere_where_a_vehicle_may_stand_that_has_not_come_that_far() {
+    let mut hall = hall_with_a_return();
+    for number in 0..2 {
+        report(&mut hall, number);
+    }
+    deliver_orders(&mut hall);
+    report(&mut hall, 0);
+    report(&mut hall, 1);
+    drive_on(&mut hall, 1);
+    deliver_orders(&mut hall);
+    report(&mut hall, 0);
+    drive_on(&mut hall, 0);
+    assert_eq!(hall.trucks[0].last_node.0, "1-0");
+    assert_eq!(hall.master.vehicles[0].released, 3, "the way back to this place");
+    // The last node is free, and an update for it would begin at the place where the vehicle stands.
+    drive_on(&mut hall, 1);
+    assert!(hall.orders[0].is_empty(), "{:?}", hall.orders[0]);
+    drive_on(&mut hall, 0);
+    assert_eq!(hall.orders[0].len(), 1, "past it nothing can be mistaken");
+    hall.settle();
+    assert!(hall.master.is_complete());
 }
