@@ -141,8 +141,6 @@ fn a_reference_leads_where_the_run_flies_and_its_fallback_goes_on() {
     let mut flight = Flight::start(&ring(6, "pc", ""));
     for _ in 0..20 {
         flight.exchange_reports(|_, _| false);
-        let before: Vec<Replica> = Vec::new();
-        drop(before);
         let starts: Vec<Pose2> = flight.replicas.iter().map(|one| one.report().part.pose).collect();
         // The references need the controls that are decided in the cycle, so they are made on copies from before.
         let copies: Vec<AirspaceState> = flight
@@ -168,7 +166,7 @@ fn a_reference_leads_where_the_run_flies_and_its_fallback_goes_on() {
             let flown = replica.report().part.pose;
             assert!(crate::flight::distance_m(end.pose.at, flown.at) < 1e-6, "{end:?} {flown:?}");
             // What follows is the stored fallback, an orbit from there on.
-            let mut alone =
+            let alone =
                 AirspaceState::restore(&replica.world, &replica.state.snapshot(replica.cycle));
             for cycle in rest {
                 alone.set_controls(cycle.cycle, Vec::new());
@@ -300,7 +298,7 @@ fn scenarios_that_cannot_be_flown_without_a_server_say_what_to_change() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(8))]
 
     /// Whatever is lost of reports and packets, for whomever, no pair loses separation, with the errors for which the shield
     /// allows on top.
@@ -308,7 +306,7 @@ proptest! {
     fn no_loss_of_reports_makes_any_pair_lose_separation(
         seed in 0u64..1000, share in 0.05f64..0.7, dead in prop::option::of(0u32..6), loss in 0.0f64..0.4,
     ) {
-        let text = ring(6, "pc", &format!("loss = {loss:.2}")).replace("seed = 3", &format!("seed = {seed}"));
+        let text = ring(6, "mvp", &format!("loss = {loss:.2}")).replace("seed = 3", &format!("seed = {seed}"));
         let mut flight = Flight::start(&text);
         let mut state = seed;
         let mut unheard = 0;
@@ -329,9 +327,9 @@ proptest! {
         }
         prop_assert!(unheard > 0);
         let metrics = flight.run.metrics();
-        prop_assert_eq!(&metrics["losses_of_separation"], &serde_json::json!(0), "{}", metrics);
+        prop_assert_eq!(metrics.losses_of_separation, 0);
         // The gap that errors need is kept, too.
-        let nearest_m = metrics["min_separation_m"].as_f64().unwrap_or(f64::INFINITY);
+        let nearest_m = metrics.min_separation_m.unwrap_or(f64::INFINITY);
         prop_assert!(nearest_m >= 30.0 + 2.0 * 7.5 - 1e-6, "{}", nearest_m);
     }
 }
