@@ -225,7 +225,7 @@ fn one_that_was_not_heard_for_long_may_be_near_until_it_is_heard_again() {
         cycles += 1;
     }
     // Both fly toward each other: before they meet.
-    assert!((50..100).contains(&cycles), "{cycles}");
+    assert!((20..100).contains(&cycles), "{cycles}");
     let report = flight.replicas[1].report();
     flight.replicas[0].accept_report(&report).expect("it flies no faster than it can");
     assert!(flight.replicas[0].missing().is_empty());
@@ -266,9 +266,16 @@ fn scenarios_that_cannot_be_flown_without_a_server_say_what_to_change() {
         format!("{}: {}", limit.cause, limit.remedy)
     };
     let good = ring(3, "pc", "");
+    // With a network a scenario of one process does not compile.
+    let without_network: Vec<&str> = good
+        .lines()
+        .filter(|line| !line.contains("network") && !line.contains("deadline_s"))
+        .collect();
+    let alone = without_network.join("\n").replace("replica-team", "direct");
+    let alone = alone.replace("groups = \"heard\"\n", "");
     let more = |keys: &str| good.replace("dt_s = 2.0", &format!("dt_s = 2.0\n{keys}"));
     for (text, words) in [
-        (good.replace("replica-team", "direct").replace("groups = \"heard\"\n", ""), "deployment="),
+        (alone, "deployment="),
         (good.replace("groups = \"heard\"", ""), "airspace.groups=heard"),
         (more("shield = \"off\""), "airspace.shield=on"),
         (good.replace("deadline_s = 0.7", ""), "airspace.network.deadline_s=0.7"),
