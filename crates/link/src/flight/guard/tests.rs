@@ -198,7 +198,8 @@ fn an_aircraft_that_somebody_else_flies_is_told_nothing() {
 
 #[test]
 fn an_aircraft_that_refuses_is_asked_again() {
-    let mut test = guard(10.0, limits(&FenceSettings::default()));
+    let impatient = GuardLimits { max_age_s: 0.0, ..limits(&FenceSettings::default()) };
+    let mut test = guard(10.0, impatient);
     let plant =
         FakeAircraft { told: Arc::clone(&test.told), state: Arc::clone(&test.state), refusals: 1 };
     test.guard.plant = Box::new(plant);
