@@ -2,6 +2,7 @@
 
 use crate::input::refused;
 use crate::processes::{LinkProcess, folder, job, signal};
+use crate::tls::authority;
 use serde_json::Value;
 use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{
@@ -154,6 +155,19 @@ fn nodes_that_are_started_one_by_one_find_each_other_by_listed_endpoints() {
         assert!(arrived.max_deviation_m > 0.0, "a model that lags is behind: {arrived:?}");
         assert_eq!(node.end(), (Some(0), None));
     }
+}
+
+#[test]
+fn with_certificates_all_links_are_encrypted_and_a_flight_ends_as_ever() {
+    let folder = folder(&ring(3, 8, ""));
+    let Some(tls) = authority(folder.path(), "ours", 2) else { return };
+    let job = recorder(folder.path());
+    let common = CommonSettings { tls: Some(tls), ..job.common.clone() };
+    let job = FlightRecorderJob { common, ..job };
+    let program = LinkProcess::start(&Job::FlightRecorder(Box::new(job)));
+    let (summary, fleet) = program.complete();
+    check_recording(folder.path(), &summary);
+    assert!(fleet.nodes.iter().all(|node| node.flown > 0), "{fleet:?}");
 }
 
 #[test]
