@@ -3,6 +3,7 @@
 //! The interpreter is that of SIDESTEP_PYTHON, else `python3`; where it or the package is not here these tests are skipped,
 //! unless SIDESTEP_REQUIRE names `python`.
 
+mod flights;
 mod vehicles;
 
 use serde_json::{Value, json};

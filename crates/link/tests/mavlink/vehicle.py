@@ -25,7 +25,7 @@ each answer is a line:
     reboot      its clock begins anew, it is silent for `seconds`, and has forgotten mode, rates and what it was told
     adsb        send the report of another aircraft: `fields`
     foreign     send a heartbeat of another system, one of version 1, bytes that are nothing, and one that is not signed
-    separation  the smallest distance of any two so far, in meters, and the time in seconds since then
+    separation  the smallest true distance so far of any two that are not among `without`, in meters
 """
 
 import json
@@ -430,8 +430,7 @@ class Airspace:
         self.vehicles = [Vehicle(n, config) for n, config in enumerate(CONFIG["vehicles"])]
         self.lock = threading.Lock()
         self.has_ended = False
-        self.nearest = math.inf
-        self.began = time.monotonic()
+        self.nearest = {}
 
     def run(self):
         before = time.monotonic()
@@ -452,15 +451,18 @@ class Airspace:
     def advance(self):
         for vehicle in self.vehicles:
             vehicle.advance(STEP_S)
-        flying = [vehicle.body.at for vehicle in self.vehicles if vehicle.is_armed]
-        for n, a in enumerate(flying):
-            for b in flying[:n]:
-                self.nearest = min(self.nearest, math.dist(a, b))
+        places = [vehicle.body.at for vehicle in self.vehicles]
+        for n, a in enumerate(places):
+            for m in range(n):
+                apart = math.dist(a, places[m])
+                self.nearest[n, m] = min(self.nearest.get((n, m), apart), apart)
 
     def obey(self, request):
         what = request["do"]
         if what == "separation":
-            return {"nearest": self.nearest, "seconds": time.monotonic() - self.began}
+            without = request["without"]
+            pairs = [apart for pair, apart in self.nearest.items() if not set(pair) & set(without)]
+            return min(pairs)
         vehicle = self.vehicles[request.get("vehicle", 0)]
         if what == "report":
             return vehicle.report()
