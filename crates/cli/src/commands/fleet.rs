@@ -388,10 +388,19 @@ fn flight_lines(fleet: &FleetStatus) -> KeyValues {
         "{} cycles of an airplane without all reports around it",
         group_thousands(counted("unheard-cycles"))
     );
+    let milliseconds = |within_ms: Option<f64>| {
+        within_ms.map_or("-".into(), |within_ms| group_thousands(within_ms as u64))
+    };
+    let decided = format!(
+        "within {} ms (half), {} ms (99 %) of a cycle",
+        milliseconds(fleet.talk_p50_ms),
+        milliseconds(fleet.talk_p99_ms)
+    );
     let differing = format!("{} reports", group_thousands(sum(|node| node.differing)));
     let held = fleet.nodes.iter().filter(|node| node.state == "held").count();
     vec![
         key_value_pair("controls", controls),
+        key_value_pair("decided", decided),
         key_value_pair("unheard", unheard),
         key_value_pair("differ from the record", differing),
         key_value_pair("handed over", format!("{held} vehicles")),

@@ -42,7 +42,7 @@ const USAGE: &str = "\
 sidestep node <SCENARIO> --airplane <ID> --connect <ENDPOINT> [OPTIONS]
        sidestep node <SCENARIO> --connector <CHAIN.K> --connect <ENDPOINT>
        sidestep node <SCENARIO> --robot <ID> --connect <ENDPOINT>
-       sidestep node <SCENARIO> --airplane <ID> --start <TIME> --peers <ENDPOINT>";
+       sidestep node <SCENARIO> --airplane <ID> --start <TIME> [OPTIONS]";
 
 /// The nouns of agents, which are the options that select them.
 const AIRPLANE: &str = "airplane";

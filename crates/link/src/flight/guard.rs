@@ -153,6 +153,8 @@ pub struct Guard {
     clock: WallClock,
     limits: GuardLimits,
     phase: GuardPhase,
+    /// When the first setpoint was sent: some measure nothing before.
+    first_led: Option<Instant>,
     /// When it hands over again, if the aircraft has refused.
     hold_again: Option<(Instant, String)>,
     traffic_at: Instant,
@@ -173,6 +175,7 @@ impl Guard {
             clock,
             limits,
             phase: GuardPhase::Leads,
+            first_led: None,
             hold_again: None,
             traffic_at: Instant::now(),
             report: GuardReport::default(),
@@ -213,6 +216,7 @@ impl Guard {
         }
         match lead {
             Lead::To(setpoint) => {
+                self.first_led.get_or_insert_with(Instant::now);
                 if let Err(reason) = self.plant.lead(&setpoint) {
                     self.report.events.push(format!("a setpoint was not sent: {reason}"));
                 }
@@ -281,6 +285,10 @@ impl Guard {
         }
         if let Some(deviation_m) = deviation_m {
             self.report.max_deviation_m = self.report.max_deviation_m.max(deviation_m);
+        }
+        let led_s = self.first_led.map_or(0.0, |led| led.elapsed().as_secs_f64());
+        if state.is_none() && led_s <= self.limits.max_age_s {
+            return;
         }
         let view = GuardView { state, setpoint, silent_s: self.board.silent_s() };
         if let Some(cause) = self.limits.check(&view) {

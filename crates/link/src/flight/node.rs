@@ -13,7 +13,8 @@ use super::channel::{FlightChannel, ReceivedContent};
 use super::message::{FlightContent, FlightReport, Presence, Standing};
 use super::time::{FlightTime, WallClock, wait_until};
 use crate::plant::aircraft::TrafficReport;
-use crate::protocol::{AgentPacket, Incarnation, NodeStatusReport};
+use crate::protocol::{AgentPacket, NodeStatusReport};
+use crate::server::histogram::Histogram;
 use crate::wire::PeerId;
 use sidestep::kernel::network::NetworkAgent;
 use sidestep::kernel::{Cycle, EntityId};
@@ -44,6 +45,11 @@ const SPARE_CYCLES: usize = 2;
 
 /// Cycles for which a node goes on to report after the end of the flight, so that the last reports arrive.
 const FAREWELL_CYCLES: u64 = 2;
+
+/// The names of the times in milliseconds within which half of the controls, and 99 of 100, were handed over.
+pub const DECISION_P50_MS: &str = "decision-p50-ms";
+/// See [`DECISION_P50_MS`].
+pub const DECISION_P99_MS: &str = "decision-p99-ms";
 
 /// Most packets that are kept for a conversation that has not begun here.
 const MAX_EARLY_PACKETS: usize = 10_000;
@@ -126,7 +132,8 @@ pub struct FlightNode<'a> {
     heard: BTreeSet<EntityId>,
     counts: BTreeMap<&'static str, u64>,
     max_behind_s: f64,
-    recorder: Option<Incarnation>,
+    /// Times from the beginning of a cycle until the control of the next one is handed over.
+    decision_time: Histogram,
 }
 
 impl<'a> FlightNode<'a> {
@@ -166,7 +173,7 @@ impl<'a> FlightNode<'a> {
             heard: BTreeSet::new(),
             counts: BTreeMap::new(),
             max_behind_s: 0.0,
-            recorder: None,
+            decision_time: Histogram::default(),
         }
     }
 
@@ -439,8 +446,13 @@ impl<'a> FlightNode<'a> {
     /// Offers a control to the guard. Returns whether it is flown.
     fn offer(&mut self, cycle: Cycle, control: &AirplaneControl) -> bool {
         let reference = self.parts.replica.reference(Some(control), self.reference_cycles());
-        let is_flown = self.parts.board.offer(cycle, reference, self.clock.now_s());
-        if !is_flown {
+        let now_s = self.clock.now_s();
+        let is_flown = self.parts.board.offer(cycle, reference, now_s);
+        if is_flown {
+            let began_s = self.time.cycle_at_s(cycle as i64 - 1, 0.0);
+            let taken = Duration::try_from_secs_f64(now_s - began_s).unwrap_or_default();
+            self.decision_time.record(taken);
+        } else {
             self.count("refused-controls");
         }
         is_flown
@@ -571,13 +583,12 @@ impl<'a> FlightNode<'a> {
     }
 
     fn on_message(&mut self, received: ReceivedContent) {
-        let ReceivedContent { from, incarnation, start_s, is_in_time, content } = received;
+        let ReceivedContent { from, start_s, is_in_time, content, .. } = received;
         if let Some(behind_s) = self.parts.channel.behind_s(from) {
             self.max_behind_s = self.max_behind_s.max(behind_s.abs());
         }
         let from = match from {
             PeerId::Server => {
-                self.recorder = Some(incarnation);
                 self.on_recorder(&content, start_s);
                 return;
             }
@@ -704,6 +715,11 @@ impl<'a> FlightNode<'a> {
         (self.on_status)(&status);
     }
 
+    /// Returns the time in milliseconds within which a share of the controls was handed over.
+    fn decision_ms(&self, share: f64) -> u64 {
+        self.decision_time.quantile(share).map_or(0, |within_s| (1e3 * within_s).round() as u64)
+    }
+
     fn flight_status(&self) -> FlightStatus {
         let guard = self.parts.board.guard();
         let own = self.counts.iter().map(|(&name, &count)| (name.to_string(), count));
@@ -716,6 +732,8 @@ impl<'a> FlightNode<'a> {
             // The conversion saturates.
             ("clock-difference-ms".to_string(), clock_ms as u64),
             ("handed-over".to_string(), u64::from(guard.held.is_some())),
+            (DECISION_P50_MS.to_string(), self.decision_ms(0.5)),
+            (DECISION_P99_MS.to_string(), self.decision_ms(0.99)),
         ];
         let all = own.chain(self.parts.channel.counts()).chain(packets).chain(guard.counts);
         let mut counts: Vec<(String, u64)> = all.chain(further).collect();

@@ -7,6 +7,7 @@
 
 use super::channel::{FlightChannel, ReceivedContent};
 use super::message::{FlightContent, FlightReport, Presence, Standing};
+use super::node::{DECISION_P50_MS, DECISION_P99_MS};
 use super::time::{FlightTime, WallClock};
 use crate::agent::SerializedControls;
 use crate::hosted_run::HostedRun;
@@ -271,11 +272,20 @@ impl<'a> FlightRecorder<'a> {
             has_begun,
             late_cycles: self.invalid,
             flown_s,
+            talk_p50_ms: self.slowest_ms(DECISION_P50_MS),
+            talk_p99_ms: self.slowest_ms(DECISION_P99_MS),
             noun: self.run.world().name(0).noun.into(),
             waits_for: absent.map(|node| node.name.clone()).collect(),
             nodes,
             ..FleetStatus::default()
         }
+    }
+
+    /// Returns the largest of some times of all nodes, in milliseconds.
+    fn slowest_ms(&self, name: &str) -> Option<f64> {
+        let counts = self.nodes.iter().flat_map(|node| &node.status.dropped);
+        let times = counts.filter(|(counted, _)| counted == name).map(|(_, ms)| *ms as f64);
+        times.reduce(f64::max)
     }
 
     fn node_status(&self, agent: EntityId) -> NodeStatus {

@@ -221,6 +221,7 @@ fn a_flight_in_which_nothing_is_lost_ends_as_in_one_process() {
     let unknown: u64 = recorded.status.nodes.iter().map(|node| node.late).sum();
     let late = ["late-controls", "refused-controls", "late-cycles", "unheard-cycles"];
     let late: u64 = late.into_iter().map(|name| recorded.counted(name)).sum();
+    let late = late + recorded.metrics["contacts_lost"].as_u64().expect("a count");
     assert_eq!(differing, 0, "what is recorded is what was flown");
     // A machine that is too busy for half a second a cycle flies otherwise, and says so.
     if late + unknown > 0 {

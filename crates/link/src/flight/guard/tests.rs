@@ -135,7 +135,6 @@ fn whatever_is_beyond_a_limit_hands_the_aircraft_over_once_and_for_good() {
     let circle = FenceSettings { circle: Some(([0.0, 0.0], 100.0)), ..FenceSettings::default() };
     let good = state_at([0.0, 0.0]);
     for (what, state) in [
-        ("measures nothing", None),
         ("2.0 s old", Some(AircraftState { age_s: 2.0, ..good })),
         ("from where it is to be", Some(state_at([6.0, 0.0]))),
         ("from where it is to be", Some(AircraftState { altitude_m: 60.0, ..good })),
@@ -155,6 +154,19 @@ fn whatever_is_beyond_a_limit_hands_the_aircraft_over_once_and_for_good() {
         drop(test.guard);
         assert_eq!(test.told.lock().expect("a test").holds.len(), 1, "{what}: not again");
     }
+}
+
+#[test]
+fn an_aircraft_that_measures_nothing_has_a_little_time_after_its_first_setpoint() {
+    let patient = GuardLimits { max_age_s: 600.0, ..limits(&FenceSettings::default()) };
+    let mut test = guard(10.0, patient);
+    assert_eq!(test.step_with(None).held, None);
+    let mut test = guard(10.0, GuardLimits { max_age_s: 0.0, ..limits(&FenceSettings::default()) });
+    std::thread::sleep(Duration::from_millis(2));
+    test.step_with(None);
+    std::thread::sleep(Duration::from_millis(2));
+    let report = test.step_with(None);
+    assert!(report.held.is_some_and(|held| held.contains("measures nothing")));
 }
 
 #[test]
@@ -186,15 +198,16 @@ fn an_aircraft_that_somebody_else_flies_is_told_nothing() {
 
 #[test]
 fn an_aircraft_that_refuses_is_asked_again() {
-    let mut test = guard(10.0, limits(&FenceSettings::default()));
+    let impatient = GuardLimits { max_age_s: 0.0, ..limits(&FenceSettings::default()) };
+    let mut test = guard(10.0, impatient);
     let plant =
         FakeAircraft { told: Arc::clone(&test.told), state: Arc::clone(&test.state), refusals: 1 };
     test.guard.plant = Box::new(plant);
-    test.step_with(None);
+    test.step_with(Some(state_at([0.0, 0.0])));
     assert!(test.guard.hold_again.is_some());
     test.guard.hold_again = Some((Instant::now(), "again".into()));
     test.step_with(None);
-    assert_eq!(test.told().holds, ["it measures nothing", "again"]);
+    assert_eq!(test.told().holds, ["its measurements are 0.1 s old", "again"]);
     assert!(test.guard.hold_again.is_none());
 }
 
