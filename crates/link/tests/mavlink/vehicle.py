@@ -193,6 +193,7 @@ class UdpWire:
         self.socket.bind(("127.0.0.1", 0))
         self.socket.setblocking(False)
         self.peer = ("127.0.0.1", config["connect"]) if "connect" in config else None
+        self.connections = 0
 
     def port(self):
         return self.socket.getsockname()[1]
@@ -221,6 +222,7 @@ class TcpWire:
         self.socket.listen()
         self.socket.setblocking(False)
         self.stream = None
+        self.connections = 0
 
     def port(self):
         return self.socket.getsockname()[1]
@@ -229,6 +231,7 @@ class TcpWire:
         try:
             self.stream, _ = self.socket.accept()
             self.stream.setblocking(False)
+            self.connections += 1
         except BlockingIOError:
             pass
         if not self.stream:
@@ -485,6 +488,7 @@ class Vehicle:
             "setpoint": self.last_setpoint,
             "traffic": self.traffic,
             "rates": self.rates,
+            "connections": self.wire.connections,
         }
 
 
