@@ -75,6 +75,8 @@ pub struct FlightRecorder<'a> {
     time: FlightTime,
     /// Whether the start is still to be set here.
     sets_start: bool,
+    /// Seconds of the scenario before the start in which vehicles fly to their first poses.
+    run_up_s: f64,
     nodes: Vec<NodeRecord>,
     /// Reports by the cycle at whose start they are, and airplane.
     reports: BTreeMap<Cycle, BTreeMap<EntityId, FlightReport>>,
@@ -99,12 +101,19 @@ impl<'a> FlightRecorder<'a> {
             hooks,
             sets_start: !time.start_s.is_finite(),
             time,
+            run_up_s: 0.0,
             nodes: (0..airplanes).map(|_| NodeRecord::default()).collect(),
             reports: BTreeMap::new(),
             report_at: Instant::now(),
             start_at: Instant::now(),
             invalid: 0,
         }
+    }
+
+    /// Returns the recorder with a time, in seconds of the scenario, that vehicles have for their run-up to the start.
+    #[must_use]
+    pub fn with_run_up(self, run_up_s: f64) -> Self {
+        Self { run_up_s, ..self }
     }
 
     /// Listens to the end of the flight.
@@ -143,8 +152,9 @@ impl<'a> FlightRecorder<'a> {
             .all(|node| node.presence.as_ref().is_some_and(|presence| presence.is_ready));
         if self.sets_start && are_ready {
             self.sets_start = false;
-            // The cycle before the first one decides that.
-            self.time.start_s = now_s + START_DELAY_S + self.time.dt_s / self.time.speed;
+            // The cycle before the first one decides that, and vehicles set out before it.
+            let before_s = self.time.dt_s.max(self.run_up_s) / self.time.speed;
+            self.time.start_s = now_s + START_DELAY_S + before_s;
             self.channel.set_start(self.time.start_s);
         }
         let is_told = self.time.start_s.is_finite() && now_s < self.time.start_s;

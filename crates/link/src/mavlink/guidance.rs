@@ -214,10 +214,8 @@ impl Guidance {
         }
         let part = reach_m / distance_m;
         let frame = Surface::Earth.frame_at(vehicle.fix.at);
-        let mut at = deviation.reference.at.map(|offset_m| offset_m * part);
-        for axis in 0..2 {
-            at[axis] += vehicle.fix.velocity_m_s[axis] * vehicle.age_s;
-        }
+        let flown_m = vehicle.fix.velocity_m_s.map(|speed_m_s| speed_m_s * vehicle.age_s);
+        let at = [0, 1].map(|axis| flown_m[axis] + part * deviation.reference.at[axis]);
         GeoPose { at: frame.to_world(at), heading_rad: setpoint.pose.heading_rad }
     }
 

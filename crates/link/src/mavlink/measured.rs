@@ -9,7 +9,7 @@ use ::mavlink::dialects::common::{GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavL
 use sidestep::kernel::math::{atan2, hypot};
 use std::time::{Duration, Instant};
 
-/// Time without a heartbeat after which nobody knows who is in control: three are missing.
+/// Time without a heartbeat from which on what is known grows old: three are missing.
 const HEARTBEAT_PATIENCE: Duration = Duration::from_millis(3500);
 
 /// Speed below which the motion of a vehicle has no direction, in meters per second: noise of its receiver.
@@ -149,11 +149,8 @@ impl Measured {
         self.heartbeat_at.elapsed()
     }
 
-    /// Returns who is in control. Without heartbeats nobody knows, and setpoints may be of no effect.
+    /// Returns who is in control, as the last heartbeat says.
     pub(super) fn authority(&self, identity: Identity) -> Authority {
-        if self.silence() > HEARTBEAT_PATIENCE {
-            return Authority::Vehicle;
-        }
         let heartbeat = self.heartbeat.as_ref();
         heartbeat.map_or(Authority::Vehicle, |heartbeat| identity.authority(heartbeat, self.landed))
     }
@@ -169,6 +166,13 @@ impl Measured {
         Some(GeoPose { at: fix.at, heading_rad: direction_rad })
     }
 
+    /// Returns the age of what is known in seconds. Without heartbeats nobody knows who is in control, so that they make it old,
+    /// too.
+    pub(super) fn age_s(&self) -> f64 {
+        let silence = self.silence().saturating_sub(HEARTBEAT_PATIENCE);
+        self.clock.age_s(Instant::now()).max(silence.as_secs_f64())
+    }
+
     /// Returns the state in the scenario's coordinates; none before the first position.
     pub(super) fn state(&self, identity: Identity, geo: GeoFrame) -> Option<AircraftState> {
         let fix = self.fix.as_ref()?;
@@ -176,7 +180,7 @@ impl Measured {
             pose: geo.to_scenario(self.pose()?),
             altitude_m: geo.altitude_m(fix.altitude),
             ground_speed_m_s: fix.ground_speed_m_s(),
-            age_s: self.clock.age_s(Instant::now()),
+            age_s: self.age_s(),
             authority: self.authority(identity),
         })
     }

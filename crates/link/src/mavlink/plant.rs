@@ -329,15 +329,18 @@ impl MavlinkPlant {
             return false;
         }
         self.channel.accept_source();
+        let is_autopilot = raw.component_id() == self.identity.target()[1];
+        if is_autopilot {
+            self.note_sequence(raw.sequence());
+        }
         if raw.message_id() == ADSB_VEHICLE_DATA::ID {
             // Receivers are components of their own.
             self.on_traffic(raw);
             return false;
         }
-        if raw.component_id() != self.identity.target()[1] {
+        if !is_autopilot {
             return false;
         }
-        self.note_sequence(raw.sequence());
         match raw.message_id() {
             HEARTBEAT_DATA::ID => self.on_heartbeat(raw),
             GLOBAL_POSITION_INT_DATA::ID => self.on_position(raw),

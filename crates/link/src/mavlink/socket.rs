@@ -113,7 +113,8 @@ impl Socket {
     /// Sends a frame. Returns whether it could be sent.
     pub(super) fn send(&mut self, frame: &[u8]) -> bool {
         match self {
-            Self::Udp(udp) => udp.peer.is_some_and(|peer| udp.socket.send_to(frame, peer).is_ok()),
+            // Before anybody was heard there is nobody to whom it could be sent.
+            Self::Udp(udp) => udp.peer.is_none_or(|peer| udp.socket.send_to(frame, peer).is_ok()),
             Self::Tcp(tcp) => tcp.send(frame),
         }
     }

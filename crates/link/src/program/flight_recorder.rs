@@ -76,7 +76,8 @@ pub(super) fn run(job: &FlightRecorderJob, parent: &ParentMonitor) -> Result<(),
     };
     let mut supervisor = FlightSupervisor { children, parent };
     let hosted = HostedRun::new(run, world, &WarningLogger);
-    let mut recorder = FlightRecorder::new(channel, hosted, time, &mut supervisor);
+    let recorder = FlightRecorder::new(channel, hosted, time, &mut supervisor);
+    let mut recorder = recorder.with_run_up(job.guard.run_up_s);
     let listened = recorder.listen();
     let (status, hosted) = recorder.finish();
     supervisor.children.shut_down();

@@ -3,6 +3,7 @@
 //! The interpreter is that of SIDESTEP_PYTHON, else `python3`; where it or the package is not here these tests are skipped,
 //! unless SIDESTEP_REQUIRE names `python`.
 
+mod flights;
 mod vehicles;
 
 use serde_json::{Value, json};
@@ -258,8 +259,9 @@ fn measurements_that_stop_stand_still_or_come_late_are_old() {
     vehicles.set(&json!({ "frozen": false }));
     wait_for(&mut plant, "a fresh position", |state| state.age_s < 0.3);
     vehicles.set(&json!({ "silent": true }));
-    let silent = wait_for(&mut plant, "silence", |state| state.authority == Authority::Vehicle);
-    assert!(silent.age_s > 2.0, "{silent:?}");
+    let silent = wait_for(&mut plant, "silence", |state| state.age_s > 2.0);
+    // Who is in control is not known to have changed, so that it is asked to hold.
+    assert_eq!(silent.authority, Authority::Node);
     wait_for_count(&mut plant, "silences", 1);
     vehicles.set(&json!({ "silent": false }));
     wait_for(&mut plant, "its node's control", |state| {
@@ -399,7 +401,7 @@ fn traffic_is_shown_to_the_vehicle_and_taken_from_its_receiver() {
         heard = plant.take_traffic();
     }
     assert_eq!((heard[0].address, heard[0].ground_speed_m_s), (0x4B_1805, 50.0));
-    assert!((heard[0].altitude_m - 212.0).abs() < 0.01 && heard[0].pose.heading_rad.abs() < 1e-6);
+    assert!((heard[0].altitude_m - 212.0).abs() < 0.01 && heard[0].pose.heading_rad.abs() < 1e-3);
 }
 
 #[test]
@@ -414,4 +416,28 @@ fn whoever_could_be_reached_by_others_needs_a_key_or_has_to_say_that_it_goes_wit
     let signed = MavlinkOptions { key: Some([1; 32]), ..outside };
     let error = MavlinkPlant::connect(&signed).err().expect("nobody is there");
     assert!(!matches!(error, MavlinkError::Insecure(_)), "{error}");
+}
+
+#[test]
+fn a_stream_that_breaks_is_connected_again() {
+    if !has_modules(PEER) {
+        return;
+    }
+    let mut streaming = copter();
+    streaming["tcp"] = true.into();
+    let mut vehicles = Vehicles::start(&json!([streaming]));
+    let text = format!("tcp:127.0.0.1:{}", vehicles.ports[0]);
+    let endpoint = MavlinkEndpoint::parse(&text).expect("an endpoint");
+    let options = MavlinkOptions { endpoint, ..options(1) };
+    let mut plant = MavlinkPlant::connect(&options).expect("a vehicle");
+    wait_for(&mut plant, "a position", |state| state.authority == Authority::Node);
+    assert_eq!(vehicles.ask(&json!({ "do": "hang up" })), "done");
+    let until = Instant::now() + TEST_TIMEOUT;
+    while vehicles.report(0)["connections"] != 2 {
+        assert!(Instant::now() < until, "{:?}", plant.counts());
+        plant.wait(Duration::from_millis(100));
+    }
+    wait_for(&mut plant, "a position after it", |state| state.age_s < 0.3);
+    plant.hold("a test").expect("it holds");
+    assert_eq!(vehicles.report(0)["modes"], json!([4, 17]));
 }

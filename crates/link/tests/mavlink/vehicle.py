@@ -10,6 +10,7 @@ CONFIG is a JSON object with `origin`, a latitude and a longitude in degrees, an
     start       meters east, north and above the home, and a direction of flight in degrees clockwise from the north
     speed       of flight at the start in m/s; 0 if it is not given
     connect     the port to which it sends its datagrams; without it, it listens at a port that is told
+    tcp         whether it listens for a stream in place of datagrams
     key         the key of signed frames, as 64 hexadecimal digits; without it nothing is signed
     mode        its custom mode at the start; that in which it follows setpoints if it is not given
     ground      whether it stands on the ground, not armed
@@ -25,7 +26,8 @@ each answer is a line:
     reboot      its clock begins anew, it is silent for `seconds`, and has forgotten mode, rates and what it was told
     adsb        send the report of another aircraft: `fields`
     foreign     send a heartbeat of another system, one of version 1, bytes that are nothing, and one that is not signed
-    separation  the smallest distance of any two so far, in meters, and the time in seconds since then
+    hang up     close the stream
+    separation  the smallest true distance so far of any two that are not among `without`, in meters
 """
 
 import json
@@ -183,6 +185,80 @@ class Plane:
             self.at[k] += self.velocity[k] * step
 
 
+class UdpWire:
+    """Datagrams to the one who was heard last."""
+
+    def __init__(self, config):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.setblocking(False)
+        self.peer = ("127.0.0.1", config["connect"]) if "connect" in config else None
+        self.connections = 0
+
+    def port(self):
+        return self.socket.getsockname()[1]
+
+    def receive(self):
+        try:
+            data, self.peer = self.socket.recvfrom(65536)
+        except BlockingIOError:
+            return None
+        return data
+
+    def send(self, data):
+        if self.peer:
+            self.socket.sendto(data, self.peer)
+
+    def hang_up(self):
+        pass
+
+
+class TcpWire:
+    """A stream to the one who has connected last, in which frames are cut anywhere."""
+
+    def __init__(self):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.listen()
+        self.socket.setblocking(False)
+        self.stream = None
+        self.connections = 0
+
+    def port(self):
+        return self.socket.getsockname()[1]
+
+    def receive(self):
+        try:
+            self.stream, _ = self.socket.accept()
+            self.stream.setblocking(False)
+            self.connections += 1
+        except BlockingIOError:
+            pass
+        if not self.stream:
+            return None
+        try:
+            return self.stream.recv(17) or None
+        except BlockingIOError:
+            return None
+        except ConnectionError:
+            self.stream = None
+            return None
+
+    def send(self, data):
+        if not self.stream:
+            return
+        try:
+            self.stream.sendall(data[:9])
+            self.stream.sendall(data[9:])
+        except OSError:
+            self.stream = None
+
+    def hang_up(self):
+        if self.stream:
+            self.stream.close()
+        self.stream = None
+
+
 class Vehicle:
     """An autopilot: its modes, its messages, and the body that it flies."""
 
@@ -195,10 +271,7 @@ class Vehicle:
         self.guided = GUIDED.get((self.kind, self.autopilot), OFFBOARD)
         self.mode = config.get("mode", self.guided)
         self.is_armed = not config.get("ground", False)
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("127.0.0.1", 0))
-        self.socket.setblocking(False)
-        self.peer = ("127.0.0.1", config["connect"]) if "connect" in config else None
+        self.wire = TcpWire() if config.get("tcp") else UdpWire(config)
         self.link = mavlink.MAVLink(None, srcSystem=config["system"], srcComponent=1)
         self.link.robust_parsing = True
         if "key" in config:
@@ -254,7 +327,7 @@ class Vehicle:
     # What it says.
 
     def send(self, message):
-        if self.peer is None or self.silent or time.monotonic() < self.speaks_at:
+        if self.silent or time.monotonic() < self.speaks_at:
             return
         self.send_bytes(message.pack(self.link))
         self.link.seq = (self.link.seq + 1) % 256
@@ -265,7 +338,7 @@ class Vehicle:
     def flush(self):
         now = time.monotonic()
         while self.queue and self.queue[0][0] <= now:
-            self.socket.sendto(self.queue.pop(0)[1], self.peer)
+            self.wire.send(self.queue.pop(0)[1])
 
     def speak(self):
         now = time.monotonic()
@@ -302,14 +375,9 @@ class Vehicle:
     # What it hears.
 
     def hear(self):
-        while True:
-            try:
-                data, source = self.socket.recvfrom(65536)
-            except BlockingIOError:
-                return
+        while data := self.wire.receive():
             if time.monotonic() < self.speaks_at:
                 continue
-            self.peer = source
             for message in self.link.parse_buffer(data) or []:
                 if message.get_type() == "BAD_DATA":
                     self.told["bad"] += 1
@@ -420,6 +488,7 @@ class Vehicle:
             "setpoint": self.last_setpoint,
             "traffic": self.traffic,
             "rates": self.rates,
+            "connections": self.wire.connections,
         }
 
 
@@ -430,12 +499,11 @@ class Airspace:
         self.vehicles = [Vehicle(n, config) for n, config in enumerate(CONFIG["vehicles"])]
         self.lock = threading.Lock()
         self.has_ended = False
-        self.nearest = math.inf
-        self.began = time.monotonic()
+        self.nearest = {}
 
     def run(self):
         before = time.monotonic()
-        sockets = [vehicle.socket for vehicle in self.vehicles]
+        sockets = [vehicle.wire.socket for vehicle in self.vehicles]
         while not self.has_ended:
             select.select(sockets, [], [], STEP_S / 2)
             with self.lock:
@@ -452,15 +520,18 @@ class Airspace:
     def advance(self):
         for vehicle in self.vehicles:
             vehicle.advance(STEP_S)
-        flying = [vehicle.body.at for vehicle in self.vehicles if vehicle.is_armed]
-        for n, a in enumerate(flying):
-            for b in flying[:n]:
-                self.nearest = min(self.nearest, math.dist(a, b))
+        places = [vehicle.body.at for vehicle in self.vehicles]
+        for n, a in enumerate(places):
+            for m in range(n):
+                apart = math.dist(a, places[m])
+                self.nearest[n, m] = min(self.nearest.get((n, m), apart), apart)
 
     def obey(self, request):
         what = request["do"]
         if what == "separation":
-            return {"nearest": self.nearest, "seconds": time.monotonic() - self.began}
+            without = request["without"]
+            pairs = [apart for pair, apart in self.nearest.items() if not set(pair) & set(without)]
+            return min(pairs)
         vehicle = self.vehicles[request.get("vehicle", 0)]
         if what == "report":
             return vehicle.report()
@@ -471,6 +542,8 @@ class Airspace:
             vehicle.send(mavlink.MAVLink_adsb_vehicle_message(*fields[:8], b"TEST", *fields[8:]))
         elif what == "foreign":
             vehicle.foreign()
+        elif what == "hang up":
+            vehicle.wire.hang_up()
         elif what == "set":
             self.set(vehicle, request)
         return "done"
@@ -489,7 +562,7 @@ def main():
     airspace = Airspace()
     thread = threading.Thread(target=airspace.run, daemon=True)
     thread.start()
-    print(json.dumps([vehicle.socket.getsockname()[1] for vehicle in airspace.vehicles]), flush=True)
+    print(json.dumps([vehicle.wire.port() for vehicle in airspace.vehicles]), flush=True)
     for line in sys.stdin:
         with airspace.lock:
             answer = airspace.obey(json.loads(line))
