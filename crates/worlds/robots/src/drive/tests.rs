@@ -505,7 +505,7 @@ fn a_robot_under_orders_is_driven_to_goals_from_outside_and_stands_without_one()
     assert_eq!(floor.plants[0].driver.counts().actions, 0, "it waits, which is no action");
     assert!(hypot(floor.plants[0].pose.at_m[0] - pose.at_m[0], 0.0) < 1e-9);
     let driver = &mut floor.plants[0].driver;
-    let wall = driver.set_goal(&Pose2 { at_m: [3.2, 3.7], yaw_rad: 0.0 });
+    let wall = driver.set_goal(&Pose2 { at_m: [2.4, 3.7], yaw_rad: 0.0 });
     assert!(matches!(wall, Err(DriveGoalRefusal::Goal(_))), "{wall:?}");
     assert_eq!(driver.set_goal(&goal), Ok(GridPose { col: 4, row: 2, heading: 1 }));
     floor.advance(1200);
