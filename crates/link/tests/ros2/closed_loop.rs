@@ -29,14 +29,27 @@ use std::sync::Arc;
 const OFFICE: &str = include_str!("../../../../scenarios/robots/office.toml");
 
 const BOX_M: f64 = 0.25;
-const RADIUS_M: f64 = 0.09;
+const RADIUS_M: f64 = 0.075;
 /// Standard deviation of the ranges of the plants' lasers, as tests/ros2/plant.py has it.
 const LASER_SD_M: f64 = 0.01;
 /// Standard deviation of what their localization is off.
-const DRIFT_M: f64 = 0.015;
+const DRIFT_M: f64 = 0.01;
 
-/// Starts and goals in and about the southern corridor: six robots that meet.
-const ROBOTS: [([u32; 3], [u32; 2]); 6] = [
+/// The start of each robot, a column, a row and degrees, and its goal, a column and a row.
+type Ways = [([u32; 3], [u32; 2]); 6];
+
+/// Ways in the southern corridor on which six robots meet.
+const SHORT_WAYS: Ways = [
+    ([20, 23, 0], [27, 27]),
+    ([27, 24, 180], [20, 26]),
+    ([20, 25, 0], [27, 25]),
+    ([27, 27, 180], [20, 23]),
+    ([22, 29, 270], [26, 23]),
+    ([26, 30, 270], [22, 23]),
+];
+
+/// Longer ones.
+const LONG_WAYS: Ways = [
     ([20, 23, 0], [31, 31]),
     ([31, 24, 180], [20, 30]),
     ([20, 27, 0], [32, 26]),
@@ -47,6 +60,7 @@ const ROBOTS: [([u32; 3], [u32; 2]); 6] = [
 
 /// How large a loop is.
 struct LoopSize {
+    ways: Ways,
     /// Trips of each robot: to its goal, and back and forth.
     trips: u64,
     rays: u32,
@@ -57,9 +71,10 @@ struct LoopSize {
 /// Returns the scenario of the office with the six robots and an effector.
 fn scenario(size: &LoopSize, head: &str, effector: &str) -> String {
     let end = OFFICE.find("[[robots]]").expect("robots");
-    let mut text = OFFICE[..end].replace("cycles = 10000", "cycles = 20000");
+    let mut text =
+        OFFICE[..end].replace("cycles = 10000", &format!("cycles = {}", 200 * size.trips));
     text = text.replace("[map]", &format!("{head}[map]"));
-    for (start, goal) in ROBOTS {
+    for (start, goal) in size.ways {
         let goals: Vec<[u32; 2]> = (0..size.trips)
             .map(|trip| if trip % 2 == 0 { goal } else { [start[0], start[1]] })
             .collect();
@@ -104,7 +119,7 @@ impl Driven {
         let folder = ScenarioFolder::new(text);
         let map = map_of(text);
         let mut plants = Plants::start_with(
-            &ROBOTS.map(|(start, _)| start),
+            &size.ways.map(|(start, _)| start),
             json!({
                 "domain": DOMAIN,
                 "map": rows_of(&map),
@@ -118,10 +133,13 @@ impl Driven {
         );
         let mut cycle_s = 0.0;
         let mut drives = Vec::new();
-        for robot in 0..ROBOTS.len() as u32 {
+        for robot in 0..size.ways.len() as u32 {
             let mut job = job(&folder.path("s.toml"), robot, plants.port);
             job.settings.radius_m = Some(RADIUS_M);
-            job.settings.clearance_m = 0.02;
+            job.settings.clearance_m = 0.01;
+            job.settings.speed_mps = 0.5;
+            job.settings.acceleration_mps2 = 1.5;
+            job.settings.turn_radps = 2.0;
             // On a busy machine measurements are late; the plants wait for those who answer.
             job.settings.patience_s = 20.0;
             cycle_s = job.settings.cycle_s;
@@ -213,11 +231,12 @@ fn predict(size: &LoopSize, text: &str, root: &Path) -> Vec<f64> {
         let compiled = WORLDS.compile(&source).unwrap_or_else(|error| panic!("{error}"));
         let mut run = compiled.start(&source, 1);
         while !has_ended(&*run, size) {
-            assert_eq!(run.advance(1), 1, "all trips are made in time");
+            assert!(run.cycle() < 2000 * size.trips, "all trips are made in time");
+            run.advance(1);
         }
         let metrics = run.agent_metrics();
         let robots = metrics.as_array().expect("one for each robot");
-        let means = robots.iter().filter_map(|robot| robot["trip_cycles_mean"].as_f64());
+        let means = robots.iter().filter_map(|robot| robot["counts"]["trip_cycles_mean"].as_f64());
         totals.push(means.sum::<f64>() * size.trips as f64);
     }
     totals
@@ -226,7 +245,7 @@ fn predict(size: &LoopSize, text: &str, root: &Path) -> Vec<f64> {
 fn has_ended(run: &dyn Simulation, size: &LoopSize) -> bool {
     let metrics = run.agent_metrics();
     let robots = metrics.as_array().expect("one for each robot");
-    robots.iter().all(|robot| robot["trips"].as_u64() == Some(size.trips))
+    robots.iter().all(|robot| robot["counts"]["trips"].as_u64() == Some(size.trips))
 }
 
 /// Returns the mean, and the range in which 95 of 100 values are.
@@ -283,6 +302,7 @@ fn misses(believed: &[Estimate], truth: &[Estimate]) -> Vec<String> {
 fn close_loop(size: &LoopSize) {
     let plan = scenario(size, "", "nomad");
     let driven = Driven::new(size, &plan);
+    println!("{:#?}\n{}", driven.ends, driven.report);
     for (robot, end) in driven.ends.iter().enumerate() {
         assert_eq!(end.trips, size.trips, "robot {robot}: {end:?}");
         assert_eq!(driven.report[robot]["touches"], 0, "robot {robot}: {}", driven.report);
@@ -294,9 +314,18 @@ fn close_loop(size: &LoopSize) {
     let cycles: f64 = driven.trip_cycles().iter().sum();
     let laser = laser_of(&driven, &map_of(&plan), 0);
     let root = driven.folder.path("");
-    let model = scenario(size, "profiles = [\"robot.toml\"]\n", "driven");
+    // A laser by which boxes are told makes no errors that would matter.
+    let head = "profiles = [\"robot.toml\"]\n";
+    let model =
+        scenario(size, head, "driven").replace("regime = \"both\"", "regime = \"effectors\"");
     write_profile(&driven.folder, &believed);
-    let cycles_by_model = spread(&predict(size, &model, &root));
+    let mut all_cycles = predict(size, &model, &root);
+    // A trip of the simulation ends with the next decision, before which there is a delay; one that is driven does not.
+    let delays = believed.profile.delays.as_ref();
+    let delay_cycles = delays.map_or(0.0, |delays| delays.p * delays.mean_cycles());
+    let trips = size.trips as f64 * size.ways.len() as f64;
+    all_cycles.iter_mut().for_each(|cycles| *cycles -= trips * delay_cycles);
+    let cycles_by_model = spread(&all_cycles);
     // Without delays a cycle is an action.
     let mut prompt = believed.clone();
     prompt.profile.delays = None;
@@ -304,16 +333,25 @@ fn close_loop(size: &LoopSize) {
     let actions_by_model = spread(&predict(size, &model, &root));
     let by_preset = spread(&predict(size, &plan, &root));
     println!("six robots in the office, trips of each: {}", size.trips);
-    println!("actions: {actions} driven, simulated with what was learned {actions_by_model:?}");
-    println!("cycles of {} s: {cycles} driven, simulated {cycles_by_model:?}", driven.cycle_s);
-    println!("by the preset nomad, whose actions and cycles are one: {by_preset:?}");
+    println!("actions: {actions} driven, simulated with what was learned {actions_by_model:.1?}");
+    println!("cycles of {} s: {cycles} driven, simulated {cycles_by_model:.1?}", driven.cycle_s);
+    println!("actions by the preset nomad, errors of sensors and wheels: {by_preset:.1?}");
     println!("{}", believed.report);
     println!("true shares outside of the intervals: {missed:?}");
     for parameter in &laser {
         println!("laser: {} {} {:?}", parameter.name, parameter.value, parameter.interval);
     }
-    println!("laser of the plants: sigma {LASER_SD_M} m");
+    println!("laser of the plants: sigma {LASER_SD_M} m, without what their localization is off");
     assert!(missed.is_empty(), "{missed:?}");
+    let is_predicted = |driven: f64, [_, low, high]: [f64; 3]| {
+        // Beyond the spread of seeds, because what is driven is no model: the plants are never the same twice.
+        (0.85 * low..=1.15 * high).contains(&driven)
+    };
+    assert!(is_predicted(actions as f64, actions_by_model), "{actions}: {actions_by_model:?}");
+    assert!(is_predicted(cycles, cycles_by_model), "{cycles}: {cycles_by_model:?}");
+    let laser_sd_m = laser.iter().find(|parameter| parameter.name == "sigma_hit_m");
+    let laser_sd_m = laser_sd_m.expect("a spread").value;
+    assert!((LASER_SD_M..6.0 * LASER_SD_M).contains(&laser_sd_m), "{laser_sd_m}");
 }
 
 #[test]
@@ -321,12 +359,12 @@ fn six_robots_in_the_office_close_the_loop() {
     if !has_modules(PEER) {
         return;
     }
-    close_loop(&LoopSize { trips: 1, rays: 72, seeds: 40 });
+    close_loop(&LoopSize { ways: SHORT_WAYS, trips: 1, rays: 72, seeds: 40 });
 }
 
 #[test]
 #[ignore = "minutes: it makes the table of the book"]
 fn closed_loop_with_many_trips() {
     assert!(has_modules(PEER), "the plants are in Python");
-    close_loop(&LoopSize { trips: 8, rays: 360, seeds: 100 });
+    close_loop(&LoopSize { ways: LONG_WAYS, trips: 4, rays: 180, seeds: 100 });
 }
