@@ -112,7 +112,7 @@ fn heading(now: &FleetStatus) -> String {
 
 /// Returns a time, or a dash if nothing has been measured yet.
 pub(crate) fn format_ms(time_ms: Option<f64>) -> String {
-    time_ms.map_or("-".into(), |ms| format_short(ms))
+    time_ms.map_or("-".into(), format_short)
 }
 
 /// Returns a line with the nodes that the fleet waits for, if there are any.
@@ -174,6 +174,7 @@ mod tests {
             late_cycles: 1234,
             talk_p50_ms: times.0,
             talk_p99_ms: times.1,
+            server_frame_bytes: 0,
             noun: "airplane".into(),
             waits_for: Vec::new(),
             nodes,

@@ -34,7 +34,8 @@ impl Fence {
         if (1..3).contains(&settings.polygon.len()) {
             return Err("a polygon has at least 3 corners".into());
         }
-        if settings.altitude_m.is_some_and(|[low, high]| !(low < high)) {
+        let is_band = |[low, high]: [f64; 2]| low < high;
+        if settings.altitude_m.is_some_and(|altitude_m| !is_band(altitude_m)) {
             return Err("its lowest altitude is not below its highest".into());
         }
         Ok(Self {
