@@ -28,13 +28,15 @@ impl Fence {
         if !corners.all(is_finite) {
             return Err("a place in it is no number".into());
         }
-        if settings.circle.is_some_and(|(_, radius_m)| !(radius_m > 0.0 && radius_m.is_finite())) {
+        let is_radius = |radius_m: f64| radius_m > 0.0 && radius_m.is_finite();
+        if settings.circle.is_some_and(|(_, radius_m)| !is_radius(radius_m)) {
             return Err("its radius is not above 0".into());
         }
         if (1..3).contains(&settings.polygon.len()) {
             return Err("a polygon has at least 3 corners".into());
         }
-        if settings.altitude_m.is_some_and(|[low, high]| !(low < high)) {
+        let is_band = |[low, high]: [f64; 2]| low < high;
+        if settings.altitude_m.is_some_and(|band| !is_band(band)) {
             return Err("its lowest altitude is not below its highest".into());
         }
         Ok(Self {

@@ -118,15 +118,18 @@ impl GuardLimits {
         if state.authority != Authority::Node {
             return Some(HoldCause::Authority(state.authority));
         }
-        if !(state.age_s <= self.max_age_s) {
+        let is_fresh = state.age_s <= self.max_age_s;
+        if !is_fresh {
             return Some(HoldCause::OldState(state.age_s));
         }
-        if !(view.silent_s <= self.patience_s) {
+        let is_alive = view.silent_s <= self.patience_s;
+        if !is_alive {
             return Some(HoldCause::SilentProgram(view.silent_s));
         }
         let Some(setpoint) = view.setpoint else { return Some(HoldCause::NoReference) };
         let deviation_m = self.deviation_m(&state, &setpoint);
-        if !(deviation_m <= self.max_deviation_m) {
+        let is_near = deviation_m <= self.max_deviation_m;
+        if !is_near {
             return Some(HoldCause::Deviation(deviation_m));
         }
         let ahead_m = state.ground_speed_m_s * FENCE_LOOK_AHEAD_S;

@@ -95,7 +95,8 @@ impl ClockDifference {
     /// Returns whether the clocks differ by more than a tolerance.
     pub fn is_beyond(&self, tolerance_s: f64) -> bool {
         // A number that is none is beyond any tolerance.
-        self.behind_s().is_some_and(|behind_s| !(behind_s.abs() <= tolerance_s))
+        let is_within = |behind_s: f64| behind_s.abs() <= tolerance_s;
+        self.behind_s().is_some_and(|behind_s| !is_within(behind_s))
     }
 }
 
