@@ -175,7 +175,10 @@ fn fly(args: &NodeArgs, clock: FlightClock, console: Console) -> Result<ExitCode
     });
     let result = json!({ "airplane": agent.number, "flight": end });
     let was_flown = flown.is_ok();
-    console.print_result_or_short(&result, "", || flight_text(&agent, &end, was_flown))?;
+    // One that was refused has no state.
+    if !end.state.is_empty() {
+        console.print_result_or_short(&result, "", || flight_text(&agent, &end, was_flown))?;
+    }
     flown.map(|()| ExitCode::Done)
 }
 

@@ -24,16 +24,16 @@
 //! - *`a` has that of `b`, and `b` has not that of `a`.* `b` stays on its fallback. `a` sees `b` where `b` is, and may talk
 //!   with others. `b` takes part in no conversation of this cycle, so to `a` it is one that is seen and not heard, and
 //!   `a` takes no plan that is not compatible with the fallback of `b`, on either side if it cannot see on which
-//!   ([`exchange`](crate::agents::exchange)). The plan of `a` and the fallback of `b` are compatible.
+//!   (`agents/exchange.rs`). The plan of `a` and the fallback of `b` are compatible.
 //! - *Both have both.* Both see each other where they are, and what follows are the conversations of which
-//!   [`grouping`](crate::agents::grouping) and [`exchange`](crate::agents::exchange) prove that no loss of packets makes
-//!   plans that are not compatible. There each may come to another group, end early, or fly its fallback after all because
-//!   its control is late: plans are made to be compatible with the others' plans and with their fallbacks.
+//!   `agents/grouping.rs` and `agents/exchange.rs` prove that no loss of packets makes plans that are not compatible.
+//!   There each may come to another group, end early, or fly its fallback after all because its control is late: plans
+//!   are made to be compatible with the others' plans and with their fallbacks.
 //!
 //! So it does not matter who hears whom. Whoever is far away in truth is near for nobody who has its report, and one of
 //! whom the replica has only a guess does not enter a percept: either it may be near, and then there is no percept, or the
 //! guess is within the same bound and not near either. Those farther away of whom others in a conversation tell are
-//! believed as in any flight (`grouping`).
+//! believed as in any flight.
 //!
 //! What this rests on: reports are true, a vehicle is within `E` of its reference, clocks differ by no more than is allowed
 //! for in `E`, no airplane flies faster than the scenario says, and all have begun at the same state, whose fallbacks are
