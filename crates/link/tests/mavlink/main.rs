@@ -92,7 +92,7 @@ fn vehicles_of_each_kind_follow_lines_and_circles_in_the_wind() {
         flight.reference.start = state.pose;
         flight.reference.start.heading_rad = 0.0;
     }
-    fly(&mut flights, 24.0, 10.0);
+    fly(&mut flights, 20.0, 8.0);
     for (k, flight) in flights.iter().enumerate() {
         let most_m = most_m(flight);
         println!("vehicle {k}: {most_m:.2} m, {:?}", flight.plant.counts());
