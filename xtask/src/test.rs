@@ -135,6 +135,15 @@ fn command(words: &[&str]) -> Command {
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(program);
     command.args(words).current_dir(root());
+    // It also tells them their own package. Build scripts that ask for that would run again in each cargo that is not
+    // started from here, and all that depends on them would be compiled again.
+    for (name, _) in std::env::vars_os() {
+        if name.to_str().is_some_and(|name| {
+            name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_")
+        }) {
+            command.env_remove(&name);
+        }
+    }
     command
 }
 
