@@ -164,7 +164,8 @@ mod tests {
     fn report(address: u32) -> TrafficReport {
         TrafficReport {
             address,
-            pose: Pose2 { at: [1000.0, 500.0], heading_rad: 0.0 },
+            // On the meridian of the origin, where the plane's east is that of the earth.
+            pose: Pose2 { at: [0.0, 500.0], heading_rad: 0.0 },
             altitude_m: 120.0,
             ground_speed_m_s: 12.34,
         }
@@ -183,7 +184,7 @@ mod tests {
         other.on_message(&message, frame(), &mut counts);
         let back = other.take();
         assert_eq!(back.len(), 1);
-        assert!((back[0].pose.at[0] - 1000.0).abs() < 0.02 && back[0].altitude_m == 120.0);
+        assert!((back[0].pose.at[1] - 500.0).abs() < 0.02 && back[0].altitude_m == 120.0);
         assert!(other.take().is_empty());
     }
 
