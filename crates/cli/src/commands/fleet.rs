@@ -432,3 +432,28 @@ fn flight_lines(fleet: &FleetStatus) -> KeyValues {
         key_value_pair("handed over", format!("{held} vehicles")),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sidestep_session::fleet::NodeStatus;
+
+    fn fleet_of_two(processor_ms: Option<u64>) -> FleetStatus {
+        let node = NodeStatus { frame_bytes: 50_000, processor_ms, ..NodeStatus::default() };
+        FleetStatus {
+            flown_s: 10.0,
+            server_frame_bytes: 200_000,
+            nodes: vec![node.clone(), node],
+            ..FleetStatus::default()
+        }
+    }
+
+    #[test]
+    fn what_a_node_uses_is_told_per_second_and_node() {
+        let usage = usage_line(&fleet_of_two(Some(250))).expect("it ran").1;
+        assert_eq!(usage, "2.50 % of a processor, 5.00 kB/s; the server 20.0 kB/s");
+        let untold = usage_line(&fleet_of_two(None)).expect("it ran").1;
+        assert_eq!(untold, "5.00 kB/s; the server 20.0 kB/s");
+        assert_eq!(usage_line(&FleetStatus::default()), None, "nothing has run");
+    }
+}

@@ -18,8 +18,7 @@ const EXAMPLES: &str = "\
 Examples:
   sidestep node ring.toml --airplane 3 --connect tcp/10.0.0.1:7600 \\
       --listen tcp/10.0.0.4:0 --insecure
-  sidestep node ring.toml --airplane 3 --connect tcp/10.0.0.1:7600 --insecure
-                                   for --topology star or multicast
+                                   no --listen for --topology star or multicast
   sidestep node chain.toml --connector 0.3 --connect tcp/10.0.0.1:7600 \\
       --listen tcp/10.0.0.4:0 --insecure
                                    connector 3 of chain 0
