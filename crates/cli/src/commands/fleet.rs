@@ -203,6 +203,14 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
     }
 }
 
+/// Returns a line with the time from percepts to the last control; none before the first cycle.
+fn latency_line(fleet: &FleetStatus) -> Option<(String, String)> {
+    let half_ms = format_short(fleet.talk_p50_ms?);
+    let most_ms = format_short(fleet.talk_p99_ms?);
+    let times = format!("{half_ms} ms for half of the cycles, {most_ms} ms for 99 %");
+    Some(key_value_pair("percept to control", times))
+}
+
 /// Returns a line with what a node used in the mean, per second in which the fleet ran; none where that is not known.
 fn usage_line(fleet: &FleetStatus) -> Option<(String, String)> {
     let node_s = fleet.flown_s * fleet.nodes.len() as f64;
@@ -383,13 +391,11 @@ impl FleetArgs {
             );
             lines.push(key_value_pair("late", late));
         }
-        if let (Some(half_ms), Some(most_ms)) = (fleet.talk_p50_ms, fleet.talk_p99_ms) {
-            let half_ms = format_short(half_ms);
-            let most_ms = format_short(most_ms);
-            let times = format!("{half_ms} ms for half of the cycles, {most_ms} ms for 99 %");
-            lines.push(key_value_pair("percept to control", times));
+        // Without a server there are no percepts from one, and the recorder has lines of its own for the rest.
+        if fleet.server_frame_bytes > 0 {
+            lines.extend(latency_line(fleet));
+            lines.extend(usage_line(fleet));
         }
-        lines.extend(usage_line(fleet));
         if restarted > 0 {
             lines.push(key_value_pair("restarted", format!("{restarted} nodes")));
         }
