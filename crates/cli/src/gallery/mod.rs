@@ -21,7 +21,7 @@ macro_rules! shipped {
 }
 
 /// The scenarios, world by world, those that show the most first.
-pub(crate) static SHIPPED: [ShippedScenario; 26] = [
+pub(crate) static SHIPPED: [ShippedScenario; 27] = [
     shipped!("robots/office"),
     shipped!("robots/crossing"),
     shipped!("robots/corridor"),
@@ -48,4 +48,5 @@ pub(crate) static SHIPPED: [ShippedScenario; 26] = [
     shipped!("airspace/mvp-speed"),
     shipped!("airspace/mvp-vertical"),
     shipped!("airspace/surveillance"),
+    shipped!("airspace/multirotors"),
 ];

@@ -41,6 +41,8 @@ fn shown_cycle(name: &str) -> Cycle {
         "chain/movers" | "chain/movers-apart" | "chain/team" => 400,
         "airspace/departures" => 400,
         "airspace/areas" => 300,
+        // In the middle, before they arrive.
+        "airspace/multirotors" => 26,
         "airspace/mixed-types" => 200,
         name if name.starts_with("airspace/") => 150,
         _ => 250,

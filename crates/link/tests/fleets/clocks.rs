@@ -20,7 +20,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Files that write the wall clock into messages for others, as ROS 2 and VDA 5050 ask for; nothing here reads it there.
-const DATED: [&str; 2] = ["ros2/node.rs", "program/dispatch.rs"];
+const DATED: [&str; 3] = ["ros2/node.rs", "program/dispatch.rs", "flight/time.rs"];
 
 /// Certificates and logs have dates; their libraries know them.
 #[test]

@@ -146,7 +146,7 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
     let server_tells = families(&text);
     let names = "cycle talk_seconds advance_seconds late_seconds late_cycles_total absurd_controls_total \
          refused_total denied_total frames_total frame_bytes_total frames_dropped_total node_up controls_flown_total \
-         controls_late_total node_lives_total";
+         controls_late_total node_lives_total node_frame_bytes_total node_processor_seconds_total";
     let all = |names: &[&str]| -> BTreeSet<String> {
         names.iter().chain(&COMMON).map(|name| format!("sidestep_{name}")).collect()
     };

@@ -147,6 +147,18 @@ impl Hall {
         assert_eq!(result["entries"], json!(self.entries()), "who comes after whom");
     }
 
+    /// Checks that all have arrived and met nobody. One that has started again before it has told how far it has come goes
+    /// some of its way twice, where that passes a place twice.
+    pub(crate) fn assert_arrived(&self, result: &Value, context: &str) {
+        assert_eq!(result["conflicts"], json!([]), "{context}: {result}");
+        let vehicles = result["vehicles"].as_array().expect("vehicles");
+        for (route, vehicle) in self.routes.iter().zip(vehicles) {
+            let goal = route.nodes.last().map(|node| node.id());
+            let last = vehicle["visited"].as_array().and_then(|visited| visited.last());
+            assert_eq!(last, goal.map(Value::from).as_ref(), "{context}: {vehicle}");
+        }
+    }
+
     /// Returns the vehicles that enter each box by the plan, in its order.
     fn entries(&self) -> BTreeMap<String, Vec<String>> {
         let plan = self.plan.as_ref().expect("a plan");
