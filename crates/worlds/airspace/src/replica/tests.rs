@@ -274,7 +274,6 @@ fn scenarios_that_cannot_be_flown_without_a_server_say_what_to_change() {
         (good.replace("deadline_s = 0.7", ""), "airspace.network.deadline_s=0.7"),
         (ring(3, "pc", "range_m = 900.0"), "leave out range_m"),
         (more("position_noise_m = 1.0"), "leave out position_noise_m"),
-        (more("changes = [{ at_s = 10.0, method = \"none\" }]"), "leave airspace.changes out"),
         (ring(12, "pc", "").replace("radius_m = 260.0", "radius_m = 40.0"), "farther apart"),
     ] {
         let said = refused(&text);
