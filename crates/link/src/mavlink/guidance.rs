@@ -83,7 +83,7 @@ pub(super) struct GeoSetpoint {
 
 /// What is measured of the vehicle that is led.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LedVehicle<'a> {
+pub(super) struct VehicleView<'a> {
     pub identity: Identity,
     pub fix: &'a Fix,
     /// The age of the measurement in seconds.
@@ -101,7 +101,7 @@ struct Deviation {
 }
 
 impl Deviation {
-    fn new(setpoint: &GeoSetpoint, vehicle: &LedVehicle<'_>) -> Self {
+    fn new(setpoint: &GeoSetpoint, vehicle: &VehicleView<'_>) -> Self {
         let frame = Surface::Earth.frame_at(vehicle.fix.at);
         let pose = Pose2 { at: setpoint.pose.at, heading_rad: setpoint.pose.heading_rad };
         let mut reference = frame.pose_to_local(pose);
@@ -119,7 +119,7 @@ impl Deviation {
 }
 
 /// Returns how far a vehicle is from its reference, in meters.
-pub(super) fn distance_m(setpoint: &GeoSetpoint, vehicle: &LedVehicle<'_>) -> f64 {
+pub(super) fn distance_m(setpoint: &GeoSetpoint, vehicle: &VehicleView<'_>) -> f64 {
     Deviation::new(setpoint, vehicle).distance_m()
 }
 
@@ -128,17 +128,17 @@ pub(super) fn distance_m(setpoint: &GeoSetpoint, vehicle: &LedVehicle<'_>) -> f6
 pub(super) struct Guidance {
     limits: FlightLimits,
     /// The velocity that was told last, in meters per second to the east and to the north.
-    velocity: Option<Told<[f64; 2]>>,
-    airspeed: Option<Told<f64>>,
+    velocity: Option<SentCommand<[f64; 2]>>,
+    airspeed: Option<SentCommand<f64>>,
     airspeed_m_s: Option<f64>,
     integrated_at: Option<Instant>,
     course_at: Option<Instant>,
-    altitude: Option<Told<AltitudeTarget>>,
+    altitude: Option<SentCommand<AltitudeTarget>>,
 }
 
-/// Something that was told to the vehicle.
+/// The last value that was sent to the vehicle.
 #[derive(Debug, Clone, Copy)]
-struct Told<T> {
+struct SentCommand<T> {
     value: T,
     at: Instant,
 }
@@ -166,7 +166,7 @@ impl Guidance {
     pub(super) fn position_target(
         &mut self,
         setpoint: &GeoSetpoint,
-        vehicle: &LedVehicle<'_>,
+        vehicle: &VehicleView<'_>,
         boot_ms: u32,
     ) -> SET_POSITION_TARGET_GLOBAL_INT_DATA {
         let pose = self.reachable_pose(setpoint, vehicle);
@@ -205,7 +205,7 @@ impl Guidance {
 
     /// Returns the reference's pose, or one on the way to it that is no farther than a second of flight: a target that is
     /// far away would be flown to at the autopilot's own largest speed.
-    fn reachable_pose(&self, setpoint: &GeoSetpoint, vehicle: &LedVehicle<'_>) -> GeoPose {
+    fn reachable_pose(&self, setpoint: &GeoSetpoint, vehicle: &VehicleView<'_>) -> GeoPose {
         let deviation = Deviation::new(setpoint, vehicle);
         let distance_m = deviation.distance_m();
         let reach_m = self.limits.max_speed_m_s * REACH_S;
@@ -233,7 +233,7 @@ impl Guidance {
                 value = [0, 1].map(|axis| told.value[axis] + part * change_m_s[axis]);
             }
         }
-        self.velocity = Some(Told { value, at: now });
+        self.velocity = Some(SentCommand { value, at: now });
         value
     }
 
@@ -241,7 +241,7 @@ impl Guidance {
     pub(super) fn plane_commands(
         &mut self,
         setpoint: &GeoSetpoint,
-        vehicle: &LedVehicle<'_>,
+        vehicle: &VehicleView<'_>,
     ) -> Vec<CommandMessage> {
         let deviation = Deviation::new(setpoint, vehicle);
         let mut commands = Vec::new();
@@ -254,7 +254,7 @@ impl Guidance {
     fn course_command(
         &mut self,
         setpoint: &GeoSetpoint,
-        vehicle: &LedVehicle<'_>,
+        vehicle: &VehicleView<'_>,
         deviation: &Deviation,
     ) -> Option<CommandMessage> {
         if self.course_at.is_some_and(|at| at.elapsed() < COURSE_INTERVAL) {
@@ -271,7 +271,7 @@ impl Guidance {
     fn airspeed_command(
         &mut self,
         setpoint: &GeoSetpoint,
-        vehicle: &LedVehicle<'_>,
+        vehicle: &VehicleView<'_>,
         deviation: &Deviation,
     ) -> Option<CommandMessage> {
         let speed_m_s = setpoint.ground_speed_m_s;
@@ -294,7 +294,7 @@ impl Guidance {
         if is_known {
             return None;
         }
-        self.airspeed = Some(Told { value: airspeed_m_s, at: now });
+        self.airspeed = Some(SentCommand { value: airspeed_m_s, at: now });
         let target = vehicle.identity.target();
         Some(CommandMessage::Long(COMMAND_LONG_DATA {
             command: MavCmd::MAV_CMD_DO_CHANGE_SPEED,
@@ -311,7 +311,7 @@ impl Guidance {
     fn altitude_command(
         &mut self,
         setpoint: &GeoSetpoint,
-        vehicle: &LedVehicle<'_>,
+        vehicle: &VehicleView<'_>,
     ) -> Option<CommandMessage> {
         let is_near = vehicle.altitude_error_m.abs() < MIN_ALTITUDE_CHANGE_M;
         let is_told = self.altitude.is_some_and(|told| {
@@ -321,7 +321,7 @@ impl Guidance {
         {
             return None;
         }
-        self.altitude = Some(Told { value: setpoint.altitude, at: Instant::now() });
+        self.altitude = Some(SentCommand { value: setpoint.altitude, at: Instant::now() });
         let altitude = altitude_of(setpoint.altitude);
         let command = vehicle.identity.command(CHANGE_ALTITUDE, [0.0; 4]);
         let z = altitude.alt_m as f32;

@@ -11,7 +11,7 @@ use super::channel::Channel;
 use super::commands::{ANSWER_TIME, CommandMessage, CommandOutcome, Commands, UNSUPPORTED};
 use super::coordinates::GeoFrame;
 use super::endpoint::MavlinkEndpoint;
-use super::guidance::{FlightLimits, GeoSetpoint, Guidance, LedVehicle, distance_m};
+use super::guidance::{FlightLimits, GeoSetpoint, Guidance, VehicleView, distance_m};
 use super::measured::{Measured, PositionUse};
 use super::messages::{CommandAck, CommandInt};
 use super::signature::KEY_BYTES;
@@ -601,7 +601,7 @@ impl MavlinkPlant {
         let Some(fix) = self.measured.fix else { return };
         let age_s = self.measured.clock.age_s(Instant::now());
         let altitude_error_m = self.geo.altitude_m(fix.altitude) - altitude_m;
-        let vehicle = LedVehicle { identity: self.identity, fix: &fix, age_s, altitude_error_m };
+        let vehicle = VehicleView { identity: self.identity, fix: &fix, age_s, altitude_error_m };
         self.take_control(setpoint, distance_m(setpoint, &vehicle));
         let is_commanded = self.identity.firmware == Firmware::ArduPilot
             && self.identity.kind == VehicleKind::FixedWing;

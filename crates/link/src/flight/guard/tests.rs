@@ -8,9 +8,9 @@ use sidestep::worlds::airspace::replica::{ReferenceCycle, ReferencePoint};
 use sidestep_session::fleet::FenceSettings;
 use std::sync::Mutex;
 
-/// What an aircraft was told.
+/// The commands that an aircraft has received.
 #[derive(Debug, Clone, Default)]
-struct Told {
+struct CommandLog {
     setpoints: Vec<Setpoint>,
     holds: Vec<String>,
     traffic: usize,
@@ -18,7 +18,7 @@ struct Told {
 
 /// An aircraft that is where a test says.
 struct FakeAircraft {
-    told: Arc<Mutex<Told>>,
+    told: Arc<Mutex<CommandLog>>,
     state: Arc<Mutex<Option<AircraftState>>>,
     refusals: usize,
 }
@@ -60,7 +60,7 @@ impl AircraftPlant for FakeAircraft {
 struct GuardTest {
     guard: Guard,
     board: Arc<FlightBoard>,
-    told: Arc<Mutex<Told>>,
+    told: Arc<Mutex<CommandLog>>,
     state: Arc<Mutex<Option<AircraftState>>>,
 }
 
@@ -90,7 +90,7 @@ fn guard(at_s: f64, limits: GuardLimits) -> GuardTest {
     };
     let points = vec![point(0.0), point(3600.0)];
     board.put_reference(vec![ReferenceCycle { cycle: 0, points, is_last: true }]);
-    let told = Arc::new(Mutex::new(Told::default()));
+    let told = Arc::new(Mutex::new(CommandLog::default()));
     let state = Arc::new(Mutex::new(Some(state_at([1.0, 0.0]))));
     let plant = FakeAircraft { told: Arc::clone(&told), state: Arc::clone(&state), refusals: 0 };
     let guard = Guard::new(Box::new(plant), Arc::clone(&board), clock, limits);
@@ -114,7 +114,7 @@ impl GuardTest {
         self.board.guard()
     }
 
-    fn told(&self) -> Told {
+    fn told(&self) -> CommandLog {
         self.told.lock().expect("a test").clone()
     }
 }
