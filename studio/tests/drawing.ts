@@ -12,9 +12,12 @@ export class PointerDriver {
   /** Returns the point of the screen where a place of the world is. */
   async at(x_m: number, y_m: number): Promise<[number, number]> {
     const layer = this.#page.locator("canvas.layer");
-    await this.#page.waitForFunction(
-      () => document.querySelector<HTMLElement>("canvas.layer")?.dataset.camera !== undefined,
-    );
+    // When panels come or go, the canvas has its new size before the camera is fitted to it.
+    await this.#page.waitForFunction(() => {
+      const canvas = document.querySelector<HTMLElement>("canvas.layer");
+      const [width_px, height_px] = canvas?.dataset.camera?.split(" ").slice(3).map(Number) ?? [];
+      return canvas !== null && width_px === canvas.clientWidth && height_px === canvas.clientHeight;
+    });
     return layer.evaluate(
       (canvas: HTMLElement, [x, y]) => {
         const [x0, y0, m] = canvas.dataset.camera!.split(" ").map(Number) as [number, number, number];

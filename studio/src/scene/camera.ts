@@ -12,6 +12,8 @@ export interface Extent {
 export interface Camera {
   readonly threeCamera: ThreeCamera;
   resize(width_px: number, height_px: number): void;
+  /** Width and height of the canvas, as of the last resize. */
+  readonly size_px: readonly [number, number];
   fit(extent: Extent): void;
   pan(dx_px: number, dy_px: number): void;
   /** Zooms in by a factor; the position under this point of the canvas stays. */
@@ -46,6 +48,10 @@ export class PlaneCamera implements Camera {
 
   constructor() {
     this.threeCamera.position.z = EYE_HEIGHT_M;
+  }
+
+  get size_px(): readonly [number, number] {
+    return [this.#width, this.#height];
   }
 
   resize(width_px: number, height_px: number): void {
@@ -145,6 +151,10 @@ export class SpaceCamera implements Camera {
 
   get mPerPx(): number {
     return (2 * this.#distance * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360)) / this.#height;
+  }
+
+  get size_px(): readonly [number, number] {
+    return [this.#width, this.#height];
   }
 
   resize(width_px: number, height_px: number): void {
