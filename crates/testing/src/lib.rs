@@ -1,5 +1,9 @@
 //! Helpers that the tests of several crates share.
 
+mod process_faults;
+
+pub use process_faults::{ProcessFault, StoppedProcesses, try_signal};
+
 use std::fmt::Display;
 use std::fs::OpenOptions;
 use std::io::Write;

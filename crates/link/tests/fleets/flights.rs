@@ -1,6 +1,6 @@
 //! Flights in real time whose processes are killed: what was flown is on disk, and nothing else is made of it.
 
-use crate::processes::{LinkProcess, folder, job, signal, try_signal, wait_until_gone};
+use crate::processes::{LinkProcess, folder, job, signal, wait_until_gone};
 use crate::support::{superconflict, wide};
 use sidestep::kernel::Cycle;
 use sidestep::kernel::ports::ColumnValues;
@@ -10,6 +10,7 @@ use sidestep_session::fleet::{ClockMode, FleetJob, FleetStatus, Job, Topology};
 use sidestep_session::{
     Error, ManagedRun, NoWatcher, RecordedRun, RunStatus, close_flight, replay_all, replay_to,
 };
+use sidestep_testing::try_signal;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 

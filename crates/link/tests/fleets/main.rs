@@ -6,6 +6,7 @@ mod chains;
 mod clocks;
 mod cuts;
 mod faults;
+mod flight_soak;
 mod flights;
 mod input;
 mod multicast;

@@ -8,6 +8,7 @@ use sidestep_session::fleet::{
     Topology, link_command,
 };
 use sidestep_session::{ManagedRun, NoWatcher, RunStatus};
+use sidestep_testing::try_signal;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -201,14 +202,6 @@ pub(crate) fn wait_until_gone(fleet: &FleetStatus, within: Duration) {
 
 pub(crate) fn signal(process: u32, name: &str) {
     assert!(try_signal(process, name), "{name} to {process}");
-}
-
-/// Sends a signal to a process that may have ended meanwhile; returns whether it had not.
-pub(crate) fn try_signal(process: u32, name: &str) -> bool {
-    let mut kill = Command::new("kill");
-    let sent =
-        kill.args([&format!("-{name}"), &process.to_string()]).stderr(Stdio::null()).status();
-    sent.expect("kill is there").success()
 }
 
 #[test]

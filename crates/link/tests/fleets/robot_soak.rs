@@ -2,7 +2,7 @@
 //!
 //! `SIDESTEP_SOAK_S` and `PROPTEST_RNG_SEED` are as in `soak.rs`.
 
-use crate::processes::{LinkProcess, folder, try_signal, wait_until_gone};
+use crate::processes::{LinkProcess, folder, wait_until_gone};
 use crate::soak::{own_memory_kb, variable};
 use crate::vehicles::{MODULES, Vehicle, fleet_without_the_last_of, listens, vehicle_job};
 use sidestep::kernel::Seed;
@@ -10,7 +10,7 @@ use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::worlds::WORLDS;
 use sidestep_session::fleet::{ClockMode, FleetStatus, LinkMessage, NodeStatus};
 use sidestep_session::{NoWatcher, RecordedRun, replay_all};
-use sidestep_testing::{has_modules, root};
+use sidestep_testing::{ProcessFault, StoppedProcesses, has_modules, root};
 use std::time::{Duration, Instant};
 
 /// The shipped fleet has six; the last one is decided by the vehicle.
@@ -22,15 +22,8 @@ const SPEED: f64 = 5.0;
 /// Longest time in which a robot makes no step: a stop, the wait before its node is started again, and joining.
 const MAX_ABSENCE: Duration = Duration::from_secs(60);
 
-/// What happens to a node, or to the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Fault {
-    Kill,
-    Stop(Duration),
-}
-
 /// Returns times since the beginning, robots and faults, by rising time.
-fn faults(seed: u64, lasts: Duration) -> Vec<(Duration, u32, Fault)> {
+fn faults(seed: u64, lasts: Duration) -> Vec<(Duration, u32, ProcessFault)> {
     let streams = Streams::new(Seed(seed));
     let mut faults = Vec::new();
     let mut at = Duration::from_secs(5);
@@ -40,12 +33,7 @@ fn faults(seed: u64, lasts: Duration) -> Vec<(Duration, u32, Fault)> {
         if at >= lasts {
             break;
         }
-        let stop = Duration::from_millis(100 + u64::from(how_long % 4_900));
-        faults.push((
-            at,
-            who % ROBOTS,
-            if what % 2 == 0 { Fault::Kill } else { Fault::Stop(stop) },
-        ));
+        faults.push((at, who % ROBOTS, ProcessFault::random(what, how_long)));
     }
     faults
 }
@@ -84,7 +72,7 @@ fn robots_whose_nodes_and_vehicle_are_killed_and_stopped_go_on_and_are_replayed(
     let mut vehicle = start();
     let planned = faults(seed, lasts);
     let mut faults = planned.iter().peekable();
-    let mut stopped: Vec<(Instant, u32)> = Vec::new();
+    let mut stopped = StoppedProcesses::default();
     let mut steps = Steps(vec![(0, Instant::now()); ROBOTS as usize]);
     let began = Instant::now();
     let mut early_kb = None;
@@ -95,13 +83,7 @@ fn robots_whose_nodes_and_vehicle_are_killed_and_stopped_go_on_and_are_replayed(
         if early_kb.is_none() && began.elapsed() > lasts / 12 {
             early_kb = own_memory_kb(fleet.child.id());
         }
-        stopped.retain(|&(until, process)| {
-            let is_over = until <= Instant::now();
-            if is_over {
-                try_signal(process, "CONT");
-            }
-            !is_over
-        });
+        stopped.wake();
         while let Some(&(_, robot, fault)) = faults.next_if(|(at, ..)| *at <= began.elapsed()) {
             // Its node is not the server's to start again, so the vehicle itself fails.
             let process = if robot == ROBOTS - 1 {
@@ -110,25 +92,17 @@ fn robots_whose_nodes_and_vehicle_are_killed_and_stopped_go_on_and_are_replayed(
                 now.nodes[robot as usize].process
             };
             let Some(process) = process else { continue };
-            match fault {
-                Fault::Kill if robot == ROBOTS - 1 => vehicle = start(),
-                Fault::Kill => {
-                    try_signal(process, "KILL");
-                }
-                Fault::Stop(time) => {
-                    if try_signal(process, "STOP") {
-                        stopped.push((Instant::now() + time, process));
-                    }
-                }
+            if robot == ROBOTS - 1 && fault == ProcessFault::Kill {
+                vehicle = start();
+            } else {
+                stopped.inflict(process, fault);
             }
         }
         if began.elapsed() > lasts {
             break now;
         }
     };
-    for (_, process) in stopped {
-        try_signal(process, "CONT");
-    }
+    drop(stopped);
     let late_kb = own_memory_kb(fleet.child.id());
     if let (Some(early_kb), Some(late_kb)) = (early_kb, late_kb) {
         println!("memory of the server: {early_kb} kB early, {late_kb} kB at the end");

@@ -4,10 +4,11 @@
 //! same faults at the same times; everything between them is up to the machine.
 
 use crate::cuts::{Cut, RoutedMachines};
-use crate::processes::{LinkProcess, folder, job, try_signal, wait_until_gone};
+use crate::processes::{LinkProcess, folder, job, wait_until_gone};
 use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::kernel::{EntityId, Seed};
 use sidestep_session::fleet::{ClockMode, FleetStatus, Job, LinkMessage, NodeStatus, Topology};
+use sidestep_testing::{ProcessFault, StoppedProcesses};
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
@@ -25,8 +26,7 @@ const MAX_ABSENCE: Duration = Duration::from_secs(60);
 /// A fault of a node, or of the link between the machines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
-    Kill,
-    Stop(Duration),
+    Process(ProcessFault),
     Cut(Cut, Duration),
 }
 
@@ -65,12 +65,12 @@ impl FaultPlan {
             if at >= lasts {
                 break;
             }
-            let stop = Fault::Stop(Duration::from_millis(100 + u64::from(how_long % 4_900)));
+            let stop = ProcessFault::Stop(Duration::from_millis(100 + u64::from(how_long % 4_900)));
             let cut_time = Duration::from_millis(1_000 + u64::from(how_long % MAX_CUT_MS));
             let fault = match what % 6 {
-                0..2 => Fault::Kill,
-                2..4 => stop,
-                _ if at + cut_time + CALM_END > lasts => stop,
+                0..2 => Fault::Process(ProcessFault::Kill),
+                2..4 => Fault::Process(stop),
+                _ if at + cut_time + CALM_END > lasts => Fault::Process(stop),
                 _ => Fault::Cut(Cut::ALL[what as usize / 6 % Cut::ALL.len()], cut_time),
             };
             faults.push((at, who % AIRPLANES, fault));
@@ -178,7 +178,7 @@ fn fly(
     let mut faults = plan.faults.iter().peekable();
     let mut cuts = 0;
     let mut present_cut: Option<(Instant, Cut)> = None;
-    let mut stopped: Vec<(Instant, u32)> = Vec::new();
+    let mut stopped = StoppedProcesses::default();
     let mut watch = ResourceMonitor::new();
     let began = Instant::now();
     let mut early = None;
@@ -189,45 +189,37 @@ fn fly(
         if early.is_none() && began.elapsed() > lasts / 12 {
             early = own_memory_kb(program.child.id());
         }
-        stopped.retain(|&(until, process)| {
-            let is_over = until <= Instant::now();
-            if is_over {
-                try_signal(process, "CONT");
-            }
-            !is_over
-        });
+        stopped.wake();
         if let (Some(machines), Some((_, cut))) =
             (machines, present_cut.take_if(|(until, _)| *until <= Instant::now()))
         {
             machines.cut(cut, false);
         }
         while let Some((_, airplane, fault)) = faults.next_if(|(at, ..)| *at <= began.elapsed()) {
-            if let Fault::Cut(cut, time) = *fault {
-                if let (Some(machines), None) = (machines, present_cut) {
-                    machines.cut(cut, true);
-                    present_cut = Some((Instant::now() + time, cut));
-                    cuts += 1;
+            let fault = match *fault {
+                Fault::Process(fault) => fault,
+                Fault::Cut(cut, time) => {
+                    if let (Some(machines), None) = (machines, present_cut) {
+                        machines.cut(cut, true);
+                        present_cut = Some((Instant::now() + time, cut));
+                        cuts += 1;
+                    }
+                    continue;
                 }
-                continue;
-            }
+            };
             let node = &now.nodes[*airplane as usize];
             let Some(process) = node.process.filter(|_| node.state != "gone") else { continue };
             // Nobody starts a node of the other machine again.
-            let is_killed = *fault == Fault::Kill && (machines.is_none() || *airplane < NEAR);
-            let is_there = try_signal(process, if is_killed { "KILL" } else { "STOP" });
+            let is_started_again = machines.is_none() || *airplane < NEAR;
             let fault = match fault {
-                Fault::Kill if !is_killed => &Fault::Stop(SHORT_STOP),
+                ProcessFault::Kill if !is_started_again => ProcessFault::Stop(SHORT_STOP),
                 fault => fault,
             };
-            if let (Fault::Stop(time), true) = (fault, is_there) {
-                stopped.push((Instant::now() + *time, process));
-            }
+            stopped.inflict(process, fault);
         }
         if began.elapsed() > lasts {
             println!("{cuts} silent cuts");
-            for (_, process) in stopped {
-                try_signal(process, "CONT");
-            }
+            drop(stopped);
             let late = own_memory_kb(program.child.id());
             if let (Some(early), Some(late)) = (early, late) {
                 println!("memory of the server: {early} kB early, {late} kB at the end");

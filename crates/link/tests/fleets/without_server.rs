@@ -16,7 +16,7 @@ use std::path::Path;
 const SPEED: f64 = 4.0;
 
 /// Returns the text of a scenario: a ring of airplanes with cycles of two seconds.
-fn ring(n: usize, cycles: u64, network: &str) -> String {
+pub(crate) fn ring(n: usize, cycles: u64, network: &str) -> String {
     format!(
         "format = 1\nworld = \"airspace\"\nseed = 3\ncycles = {cycles}\n[airspace]\n\
          deployment = \"replica-team\"\ngroups = \"heard\"\ndt_s = 2.0\nmax_rounds = 20\n\
@@ -43,7 +43,7 @@ fn clock() -> FlightClock {
     FlightClock { start_s: None, speed: SPEED, tolerance_s: 30.0 }
 }
 
-fn recorder(folder: &Path) -> FlightRecorderJob {
+pub(crate) fn recorder(folder: &Path) -> FlightRecorderJob {
     FlightRecorderJob {
         common: common(folder),
         nodes: None,
@@ -57,12 +57,12 @@ fn recorder(folder: &Path) -> FlightRecorderJob {
 }
 
 /// Returns how often something was counted by all nodes.
-fn counted(fleet: &FleetStatus, name: &str) -> u64 {
+pub(crate) fn counted(fleet: &FleetStatus, name: &str) -> u64 {
     let counts = fleet.nodes.iter().flat_map(|node| &node.counts);
     counts.filter(|(counted, _)| counted == name).map(|(_, count)| count).sum()
 }
 
-fn check_recording(folder: &Path, summary: &Value) {
+pub(crate) fn check_recording(folder: &Path, summary: &Value) {
     assert_eq!(summary["metrics"]["losses_of_separation"], 0, "{summary}");
     let recorded = RecordedRun::open(&WORLDS, &folder.join("run")).expect("an ordinary folder");
     replay_all(&recorded, 1, &NoWatcher).expect("computed again, to the same digest");

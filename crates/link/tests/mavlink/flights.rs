@@ -34,7 +34,7 @@ const SPEED_M_S: f64 = 8.0;
 const BOUND_M: f64 = 7.5;
 
 /// Returns the shipped scenario of multirotors, with so many of them on a circle, for some cycles of a second.
-fn scenario(n: usize, radius_m: f64, cycles: u64) -> JobScenario {
+pub(crate) fn scenario(n: usize, radius_m: f64, cycles: u64) -> JobScenario {
     JobScenario {
         file: root().join("scenarios/airspace/multirotors.toml"),
         overrides: vec![
@@ -120,13 +120,30 @@ impl Drop for LinkProcess {
 }
 
 /// A node, and all that it has told.
-struct Node {
+pub(crate) struct Node {
+    job: FlightJob,
     process: LinkProcess,
-    last: FlightStatus,
+    pub(crate) last: FlightStatus,
     events: Vec<String>,
 }
 
 impl Node {
+    fn start(job: FlightJob) -> Self {
+        let process = LinkProcess::start(&Job::Flight(Box::new(job.clone())));
+        Self { job, process, last: FlightStatus::default(), events: Vec::new() }
+    }
+
+    pub(crate) fn process_id(&self) -> u32 {
+        self.process.child.id()
+    }
+
+    /// Kills the node if it runs, starts it again with the endpoints of all others, and returns where it listens.
+    fn restart(&mut self, peers: Vec<String>) -> String {
+        self.job.network.peers = peers;
+        self.process = LinkProcess::start(&Job::Flight(Box::new(self.job.clone())));
+        self.process.endpoints().remove(0)
+    }
+
     /// Takes what has come.
     fn read(&mut self) {
         while let Ok(message) = self.process.messages.try_recv() {
@@ -145,20 +162,22 @@ impl Node {
         }
     }
 
-    fn counted(&self, name: &str) -> u64 {
+    pub(crate) fn counted(&self, name: &str) -> u64 {
         self.last.counts.iter().filter(|count| count.0 == name).map(|count| count.1).sum()
     }
 }
 
 /// A flight of vehicles, with a recorder.
-struct Flight {
-    vehicles: Vehicles,
-    nodes: Vec<Node>,
+pub(crate) struct Flight {
+    pub(crate) vehicles: Vehicles,
+    pub(crate) nodes: Vec<Node>,
+    /// Where each node listens.
+    endpoints: Vec<String>,
     recorder: LinkProcess,
 }
 
 impl Flight {
-    fn start(folder: &Path, flown: &JobScenario, guard: &GuardSettings) -> Self {
+    pub(crate) fn start(folder: &Path, flown: &JobScenario, guard: &GuardSettings) -> Self {
         let airplanes = airplanes(flown);
         let all: Vec<Value> =
             airplanes.iter().enumerate().map(|(n, airplane)| vehicle(n, airplane)).collect();
@@ -188,11 +207,12 @@ impl Flight {
                 plant: PlantChoice::Mavlink(mavlink(*port)),
                 guard: guard.clone(),
             };
-            let process = LinkProcess::start(&Job::Flight(Box::new(job)));
-            peers.extend(process.endpoints());
-            nodes.push(Node { process, last: FlightStatus::default(), events: Vec::new() });
+            let node = Node::start(job);
+            peers.extend(node.process.endpoints());
+            nodes.push(node);
         }
-        let network = FlightNetwork { listen: Vec::new(), peers, is_scouting: false };
+        let network =
+            FlightNetwork { listen: Vec::new(), peers: peers.clone(), is_scouting: false };
         let job = FlightRecorderJob {
             common,
             nodes: Some(0),
@@ -204,15 +224,22 @@ impl Flight {
             replace: false,
         };
         let recorder = LinkProcess::start(&Job::FlightRecorder(Box::new(job)));
-        Self { vehicles, nodes, recorder }
+        Self { vehicles, nodes, endpoints: peers, recorder }
     }
 
-    fn read(&mut self) {
+    pub(crate) fn read(&mut self) {
         self.nodes.iter_mut().for_each(Node::read);
     }
 
+    /// Kills a node, and starts it again.
+    pub(crate) fn restart(&mut self, node: usize) {
+        let mut peers = self.endpoints.clone();
+        peers.remove(node);
+        self.endpoints[node] = self.nodes[node].restart(peers);
+    }
+
     /// Waits until something holds for the nodes.
-    fn wait_for(&mut self, what: &str, holds: impl Fn(&[Node]) -> bool) {
+    pub(crate) fn wait_for(&mut self, what: &str, holds: impl Fn(&[Node]) -> bool) {
         let until = Instant::now() + TEST_TIMEOUT;
         loop {
             self.read();
@@ -226,20 +253,26 @@ impl Flight {
 
     /// Waits for the end.
     fn end(&mut self) {
-        loop {
-            match self.recorder.next("the end of the flight") {
-                LinkMessage::Ended { .. } => {
-                    self.read();
-                    return;
-                }
-                LinkMessage::Failed(error) => panic!("{error:?}"),
-                _ => {}
-            }
+        let until = Instant::now() + TEST_TIMEOUT;
+        while !self.has_ended() {
+            assert!(Instant::now() < until, "waited for the end: {:?}", self.nodes[0].last);
+            std::thread::sleep(Duration::from_millis(50));
         }
+        self.read();
+    }
+
+    /// Returns whether the recorder has told the end.
+    pub(crate) fn has_ended(&mut self) -> bool {
+        let messages = self.recorder.messages.try_iter();
+        messages.fold(false, |has_ended, message| match message {
+            LinkMessage::Ended { .. } => true,
+            LinkMessage::Failed(error) => panic!("{error:?}"),
+            _ => has_ended,
+        })
     }
 
     /// Tells how far all were from where they were to be, and how near those came to each other that are not left out.
-    fn tell(&mut self, without: &[usize]) -> f64 {
+    pub(crate) fn tell(&mut self, without: &[usize]) -> f64 {
         let nearest = self.vehicles.ask(&json!({ "do": "separation", "without": without }));
         let nearest_m = nearest.as_f64().expect("meters");
         for (k, node) in self.nodes.iter().enumerate() {
@@ -251,7 +284,7 @@ impl Flight {
         nearest_m
     }
 
-    fn handed_over(&self) -> Vec<usize> {
+    pub(crate) fn handed_over(&self) -> Vec<usize> {
         let held = |k: &usize| self.nodes[*k].counted("handed-over") > 0;
         (0..self.nodes.len()).filter(held).collect()
     }
@@ -272,7 +305,7 @@ fn mavlink(port: u16) -> MavlinkSettings {
 }
 
 /// Limits that a busy machine does not exceed, but for the distance from the reference, which the shield allows.
-fn guard() -> GuardSettings {
+pub(crate) fn guard() -> GuardSettings {
     GuardSettings {
         max_age_s: 3.0,
         patience_s: 60.0,
@@ -282,7 +315,7 @@ fn guard() -> GuardSettings {
 }
 
 /// Returns the smallest distance that the shield promises to vehicles within their errors.
-fn separation_m(flown: &JobScenario) -> f64 {
+pub(crate) fn separation_m(flown: &JobScenario) -> f64 {
     airplanes(flown)[0].model.separation_m
 }
 

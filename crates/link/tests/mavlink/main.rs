@@ -4,6 +4,7 @@
 //! unless SIDESTEP_REQUIRE names `python`.
 
 mod flights;
+mod soak;
 mod vehicles;
 
 use serde_json::{Value, json};

@@ -32,16 +32,22 @@ pub(crate) const DOMAIN: u32 = 11;
 
 /// Returns the scenario of robots with these starts and goals, each a column and a row.
 fn scenario(robots: &[([u32; 3], [u32; 2])]) -> String {
+    let ways: Vec<_> = robots.iter().map(|(start, goal)| (*start, vec![*goal])).collect();
+    scenario_with(400, &ways)
+}
+
+/// Returns the same for so many cycles, with several goals for each.
+pub(crate) fn scenario_with(cycles: u64, robots: &[([u32; 3], Vec<[u32; 2]>)]) -> String {
     let mut text = format!(
-        "format = 1\nworld = \"robots\"\nseed = 4\ncycles = 400\n[map]\nbox_size_m = {BOX_M}\n\
+        "format = 1\nworld = \"robots\"\nseed = 4\ncycles = {cycles}\n[map]\nbox_size_m = {BOX_M}\n\
          ascii = \"\"\"\n{}\n\"\"\"\n",
         HALL.join("\n")
     );
-    for ([column, row, degrees], [to_column, to_row]) in robots {
+    for ([column, row, degrees], goals) in robots {
         let heading = degrees / 90;
         text += &format!(
             "[[robots]]\nat = [[{column}, {row}, {heading}]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
-             behaviour = {{ kind = \"goto\", goals = [[{to_column}, {to_row}]], avoidance = \"plan\" }}\n"
+             behaviour = {{ kind = \"goto\", goals = {goals:?}, avoidance = \"plan\" }}\n"
         );
     }
     text
@@ -136,8 +142,23 @@ impl DriveProcess {
         Self { child, stdin: Some(stdin), messages }
     }
 
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     fn next(&self) -> LinkMessage {
         self.messages.recv_timeout(TEST_TIMEOUT).expect("the drive tells something")
+    }
+
+    /// Returns the last state of those that have come since it was asked last.
+    pub(crate) fn news(&self) -> Option<DriveStatus> {
+        let messages = self.messages.try_iter();
+        let states = messages.filter_map(|message| match message {
+            LinkMessage::Drives(status) => Some(status),
+            LinkMessage::Ros2(_) | LinkMessage::Listens(_) => None,
+            other => panic!("{other:?}"),
+        });
+        states.last()
     }
 
     /// Waits for the topics that it has.
@@ -180,7 +201,7 @@ impl DriveProcess {
     }
 
     /// Asks it to end, as Ctrl-C does, and returns how it was.
-    fn interrupt(&mut self) -> DriveStatus {
+    pub(crate) fn interrupt(&mut self) -> DriveStatus {
         drop(self.stdin.take());
         self.end()
     }

@@ -6,6 +6,7 @@
 
 mod closed_loop;
 mod drive;
+mod drive_soak;
 mod process;
 
 use process::{Peer, RosProcess, job};

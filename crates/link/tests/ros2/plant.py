@@ -7,7 +7,8 @@ CONFIG is a JSON object: `port`, at which the router listens; `domain`; `map`, r
 `starts`, a column, a row and a heading in degrees for each robot; `radius_m`; `walls`, further squares that the map of the
 robots does not have, by column and row; `stamped`, whether commands are TwistStamped; `rays` of a laser; `drift_m`, the standard
 deviation of what localization is off, which changes within a quarter of a minute; `pace`, seconds of the robots in a second at most;
-`goals`, whether goals can be sent. Wheels slip, lasers and localization are noisy. Lines on standard input:
+`goals`, whether goals can be sent; `timeout`, seconds after the last command after which a robot stands, as drivers of bases
+have it. Wheels slip, lasers and localization are noisy. Lines on standard input:
 
     silence   stop sending measurements; answers when the last command of each robot is zero
     speak     send them again
@@ -41,6 +42,7 @@ DRIFT_S = 15.0
 MAX_RANGE_M = 8.0
 # Of the scanner on its robot.
 MOUNT_M = 0.05
+TIMEOUT_S = CONFIG.get("timeout", math.inf)
 # The longest wait for a command.
 MAX_WAIT_S = 1.0
 # Longer than anything here takes, on a machine that has much else to do.
@@ -86,6 +88,8 @@ class Robot:
         self.yaw = math.radians(degrees)
         self.start = (*self.at, self.yaw)
         self.velocity = (0.0, 0.0)
+        self.commanded_at = time.monotonic()
+        self.timeouts = 0
         self.commands = 0
         self.commands_before = 0
         self.fastest = [0.0, 0.0]
@@ -104,6 +108,7 @@ class Robot:
     def on_command(self, message):
         message = getattr(message, "twist", message)
         self.velocity = (message.linear.x, message.angular.z)
+        self.commanded_at = time.monotonic()
         self.fastest = [max(a, abs(b)) for a, b in zip(self.fastest, self.velocity, strict=True)]
         self.commands += 1
 
@@ -112,6 +117,9 @@ class Robot:
 
     def advance(self, others):
         self.commands_before = self.commands
+        if self.velocity != (0.0, 0.0) and time.monotonic() - self.commanded_at > TIMEOUT_S:
+            self.velocity = (0.0, 0.0)
+            self.timeouts += 1
         speed, rate = self.velocity
         slip = 1.0 - RANDOM.uniform(0.0, 0.2, 2)
         self.yaw += rate * slip[1] * STEP_S
@@ -294,6 +302,7 @@ class Plant:
                 "velocity": robot.velocity,
                 "fastest": robot.fastest,
                 "commands": robot.commands,
+                "timeouts": robot.timeouts,
             }
             for robot in self.robots
         ]
