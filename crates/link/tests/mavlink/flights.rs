@@ -177,7 +177,18 @@ pub(crate) struct Flight {
 }
 
 impl Flight {
-    pub(crate) fn start(folder: &Path, flown: &JobScenario, guard: &GuardSettings) -> Self {
+    /// Starts a flight whose recorder sets the start once all are ready.
+    fn start(folder: &Path, flown: &JobScenario, guard: &GuardSettings) -> Self {
+        Self::start_at(folder, flown, guard, None)
+    }
+
+    /// Starts a flight that begins at a time, in seconds since 1970, so that a node that is started again knows it.
+    pub(crate) fn start_at(
+        folder: &Path,
+        flown: &JobScenario,
+        guard: &GuardSettings,
+        start_s: Option<f64>,
+    ) -> Self {
         let airplanes = airplanes(flown);
         let all: Vec<Value> =
             airplanes.iter().enumerate().map(|(n, airplane)| vehicle(n, airplane)).collect();
@@ -191,7 +202,7 @@ impl Flight {
             json_log: false,
             log: "error".into(),
         };
-        let clock = FlightClock { start_s: None, speed: 1.0, tolerance_s: TOLERANCE_S };
+        let clock = FlightClock { start_s, speed: 1.0, tolerance_s: TOLERANCE_S };
         let mut peers: Vec<String> = Vec::new();
         let mut nodes = Vec::new();
         for (airplane, port) in (0..).zip(&vehicles.ports) {

@@ -10,12 +10,15 @@ use sidestep::kernel::stream::{Purpose, Streams};
 use sidestep::worlds::WORLDS;
 use sidestep_session::{NoWatcher, RecordedRun, replay_all};
 use sidestep_testing::{ProcessFault, StoppedProcesses, has_modules};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 const AIRPLANES: usize = 6;
 
 /// Cycles of a second in a flight, which leads all of them through the middle of a circle.
 const CYCLES: u64 = 24;
+
+/// Time in which all find each other and take up their speed.
+const GATHERING_TIME: Duration = Duration::from_secs(30);
 
 /// What happens to a vehicle, to its link, or to its node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -142,7 +145,9 @@ fn vehicles_that_no_fault_meets_keep_apart_whatever_happens_to_the_others() {
         let faults = faults(seed, rounds);
         println!("flight {rounds}: {faults:?}");
         let folder = tempfile::tempdir().expect("a folder");
-        let mut flight = Flight::start(folder.path(), &flown, &guard());
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).expect("after 1970");
+        let start_s = Some((now + GATHERING_TIME).as_secs_f64());
+        let mut flight = Flight::start_at(folder.path(), &flown, &guard(), start_s);
         let healthy = fly(&mut flight, &faults);
         let without: Vec<usize> = (0..AIRPLANES).filter(|k| !healthy.contains(k)).collect();
         let nearest_m = flight.tell(&without);

@@ -35,6 +35,9 @@ const LASER_SD_M: f64 = 0.01;
 /// Standard deviation of what their localization is off.
 const DRIFT_M: f64 = 0.01;
 
+/// The name of the effector that is learned.
+const LEARNED: &str = "driven";
+
 /// The start of each robot, a column, a row and degrees, and its goal, a column and a row.
 type Ways = [([u32; 3], [u32; 2]); 6];
 
@@ -68,12 +71,15 @@ struct LoopSize {
     seeds: u64,
 }
 
-/// Returns the scenario of the office with the six robots and an effector.
-fn scenario(size: &LoopSize, head: &str, effector: &str) -> String {
+/// Returns the scenario of the office with the six robots, an effector and what errs.
+fn scenario(size: &LoopSize, effector: &str, regime: &str) -> String {
     let end = OFFICE.find("[[robots]]").expect("robots");
     let mut text =
         OFFICE[..end].replace("cycles = 10000", &format!("cycles = {}", 200 * size.trips));
-    text = text.replace("[map]", &format!("{head}[map]"));
+    text = text.replace("regime = \"both\"", &format!("regime = \"{regime}\""));
+    if effector == LEARNED {
+        text = text.replace("[map]", "profiles = [\"robot.toml\"]\n[map]");
+    }
     for (start, goal) in size.ways {
         let goals: Vec<[u32; 2]> = (0..size.trips)
             .map(|trip| if trip % 2 == 0 { goal } else { [start[0], start[1]] })
@@ -212,7 +218,7 @@ fn true_pose(track: &[[f64; 4]], time_s: f64) -> [f64; 4] {
 
 fn write_profile(folder: &ScenarioFolder, learned: &LearnedEffector) {
     let text = profile::empty("robot");
-    let text = profile::with_effector("robot.toml", &text, "driven", learned);
+    let text = profile::with_effector("robot.toml", &text, LEARNED, learned);
     std::fs::write(folder.path("robot.toml"), text.expect("a profile")).expect("written");
 }
 
@@ -222,30 +228,49 @@ fn learned(folder: &ScenarioFolder, name: &str, table: &str) -> LearnedEffector 
     from_csv(&path, &EffectorOptions::default()).expect("a table of motions")
 }
 
-/// Returns what the simulation says: for each seed the cycles that the trips of all robots take.
-fn predict(size: &LoopSize, text: &str, root: &Path) -> Vec<f64> {
-    let mut totals = Vec::new();
+/// What the trips of all robots take in simulations, one number for each seed.
+struct Prediction {
+    cycles: Vec<f64>,
+    actions: Vec<f64>,
+}
+
+/// Returns what the simulation says.
+fn predict(size: &LoopSize, text: &str, root: &Path) -> Prediction {
+    let mut prediction = Prediction { cycles: Vec::new(), actions: Vec::new() };
     for seed in 1..=size.seeds {
         let text = text.replace("seed = 1", &format!("seed = {seed}"));
         let source = Source::new("s.toml", text, root);
         let compiled = WORLDS.compile(&source).unwrap_or_else(|error| panic!("{error}"));
-        let mut run = compiled.start(&source, 1);
-        while !has_ended(&*run, size) {
-            assert!(run.cycle() < 2000 * size.trips, "all trips are made in time");
-            run.advance(1);
-        }
-        let metrics = run.agent_metrics();
-        let robots = metrics.as_array().expect("one for each robot");
-        let means = robots.iter().filter_map(|robot| robot["counts"]["trip_cycles_mean"].as_f64());
-        totals.push(means.sum::<f64>() * size.trips as f64);
+        let (cycles, actions) = trips_of(compiled.start(&source, 1), size);
+        prediction.cycles.push(cycles);
+        prediction.actions.push(actions);
     }
-    totals
+    prediction
 }
 
-fn has_ended(run: &dyn Simulation, size: &LoopSize) -> bool {
-    let metrics = run.agent_metrics();
-    let robots = metrics.as_array().expect("one for each robot");
-    robots.iter().all(|robot| robot["counts"]["trips"].as_u64() == Some(size.trips))
+/// Simulates until all trips are made, and returns the cycles and the actions that these take.
+fn trips_of(mut run: Box<dyn Simulation>, size: &LoopSize) -> (f64, f64) {
+    // Of each robot once its trips are made: then it stands, and that counts as actions, too.
+    let mut actions: Vec<Option<u64>> = vec![None; size.ways.len()];
+    loop {
+        let metrics = run.agent_metrics();
+        let robots = metrics.as_array().expect("one for each robot");
+        for (robot, actions) in robots.iter().zip(&mut actions) {
+            let has_ended = robot["counts"]["trips"].as_u64() == Some(size.trips);
+            if has_ended && actions.is_none() {
+                // The decision that has seen the goal has begun one more.
+                *actions = robot["counts"]["actions"].as_u64().map(|begun| begun - 1);
+            }
+        }
+        if actions.iter().all(Option::is_some) {
+            let of_trips = |robot: &Value| robot["counts"]["trip_cycles_mean"].as_f64();
+            let mean_cycles: f64 = robots.iter().filter_map(of_trips).sum();
+            let actions: u64 = actions.iter().flatten().sum();
+            return (mean_cycles * size.trips as f64, actions as f64);
+        }
+        assert!(run.cycle() < 2000 * size.trips, "all trips are made in time");
+        run.advance(1);
+    }
 }
 
 /// Returns the mean, and the range in which 95 of 100 values are.
@@ -300,7 +325,8 @@ fn misses(believed: &[Estimate], truth: &[Estimate]) -> Vec<String> {
 
 /// Closes the loop, prints its table, and asserts what is promised.
 fn close_loop(size: &LoopSize) {
-    let plan = scenario(size, "", "nomad");
+    // The program decides as that of the model does: robots that may err are careful, and make other ways.
+    let plan = scenario(size, "perfect", "effectors");
     let driven = Driven::new(size, &plan);
     println!("{:#?}\n{}", driven.ends, driven.report);
     for (robot, end) in driven.ends.iter().enumerate() {
@@ -310,31 +336,31 @@ fn close_loop(size: &LoopSize) {
     let believed = learned(&driven.folder, "believed.csv", &driven.motions());
     let truth = learned(&driven.folder, "true.csv", &driven.true_motions());
     let missed = misses(&believed.report.probabilities, &truth.report.probabilities);
-    let actions: u64 = driven.ends.iter().map(|end| end.actions).sum();
-    let cycles: f64 = driven.trip_cycles().iter().sum();
+    let driven_actions: u64 = driven.ends.iter().map(|end| end.actions).sum();
+    let driven_cycles: f64 = driven.trip_cycles().iter().sum();
     let laser = laser_of(&driven, &map_of(&plan), 0);
     let root = driven.folder.path("");
     // A laser by which boxes are told makes no errors that would matter.
-    let head = "profiles = [\"robot.toml\"]\n";
-    let model =
-        scenario(size, head, "driven").replace("regime = \"both\"", "regime = \"effectors\"");
+    let model = scenario(size, LEARNED, "effectors");
     write_profile(&driven.folder, &believed);
-    let mut all_cycles = predict(size, &model, &root);
+    let Prediction { mut cycles, actions } = predict(size, &model, &root);
     // A trip of the simulation ends with the next decision, before which there is a delay; one that is driven does not.
     let delays = believed.profile.delays.as_ref();
     let delay_cycles = delays.map_or(0.0, |delays| delays.p * delays.mean_cycles());
     let trips = size.trips as f64 * size.ways.len() as f64;
-    all_cycles.iter_mut().for_each(|cycles| *cycles -= trips * delay_cycles);
-    let cycles_by_model = spread(&all_cycles);
-    // Without delays a cycle is an action.
-    let mut prompt = believed.clone();
-    prompt.profile.delays = None;
-    write_profile(&driven.folder, &prompt);
-    let actions_by_model = spread(&predict(size, &model, &root));
-    let by_preset = spread(&predict(size, &plan, &root));
+    cycles.iter_mut().for_each(|cycles| *cycles -= trips * delay_cycles);
+    let cycles_by_model = spread(&cycles);
+    let actions_by_model = spread(&actions);
+    let by_preset = predict(size, &scenario(size, "nomad", "both"), &root);
+    let by_preset = spread(&by_preset.actions);
     println!("six robots in the office, trips of each: {}", size.trips);
-    println!("actions: {actions} driven, simulated with what was learned {actions_by_model:.1?}");
-    println!("cycles of {} s: {cycles} driven, simulated {cycles_by_model:.1?}", driven.cycle_s);
+    println!(
+        "actions: {driven_actions} driven, simulated with what was learned {actions_by_model:.1?}"
+    );
+    println!(
+        "cycles of {} s: {driven_cycles} driven, simulated {cycles_by_model:.1?}",
+        driven.cycle_s
+    );
     println!("actions by the preset nomad, errors of sensors and wheels: {by_preset:.1?}");
     println!("{}", believed.report);
     println!("true shares outside of the intervals: {missed:?}");
@@ -344,11 +370,14 @@ fn close_loop(size: &LoopSize) {
     println!("laser of the plants: sigma {LASER_SD_M} m, without what their localization is off");
     assert!(missed.is_empty(), "{missed:?}");
     let is_predicted = |driven: f64, [_, low, high]: [f64; 3]| {
-        // Beyond the spread of seeds, because what is driven is no model: the plants are never the same twice.
-        (0.85 * low..=1.15 * high).contains(&driven)
+        // A little beyond the spread of seeds: the plants are never the same twice.
+        (0.95 * low..=1.05 * high).contains(&driven)
     };
-    assert!(is_predicted(actions as f64, actions_by_model), "{actions}: {actions_by_model:?}");
-    assert!(is_predicted(cycles, cycles_by_model), "{cycles}: {cycles_by_model:?}");
+    assert!(
+        is_predicted(driven_actions as f64, actions_by_model),
+        "{driven_actions}: {actions_by_model:?}"
+    );
+    assert!(is_predicted(driven_cycles, cycles_by_model), "{driven_cycles}: {cycles_by_model:?}");
     let laser_sd_m = laser.iter().find(|parameter| parameter.name == "sigma_hit_m");
     let laser_sd_m = laser_sd_m.expect("a spread").value;
     assert!((LASER_SD_M..6.0 * LASER_SD_M).contains(&laser_sd_m), "{laser_sd_m}");
