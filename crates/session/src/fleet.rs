@@ -185,6 +185,9 @@ pub struct FlightJob {
     pub plant: PlantChoice,
     /// The limits of its guard.
     pub guard: GuardSettings,
+    /// The file in which it keeps what it has reported last, for a node that is started in its place.
+    #[serde(default)]
+    pub journal: Option<PathBuf>,
 }
 
 /// Job of the recorder of a flight without a server: it only listens, but for the nodes that it starts.

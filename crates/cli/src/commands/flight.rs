@@ -4,6 +4,7 @@ use clap::Args;
 use sidestep_session::fleet::{
     FenceSettings, FlightClock, FlightNetwork, GuardSettings, ModelPlantSettings, PlantChoice,
 };
+use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Seconds of a day.
@@ -108,6 +109,11 @@ pub(crate) struct FlightArgs {
     #[arg(long, value_name = "X", default_value_t = 1.0, requires = "start", value_parser = super::fleet::parse_speed)]
     speed: f64,
 
+    /// Keep what the airplane has reported last in this file: a node that is started in its place goes on
+    /// from there, and need not ask the others
+    #[arg(long, value_name = "FILE", requires = "start")]
+    journal: Option<PathBuf>,
+
     /// Seconds by which the clocks of two nodes may differ: reports of others count as missing
     #[arg(long, value_name = "S", default_value_t = 0.1, requires = "start", value_parser = parse_positive)]
     clock_tolerance: f64,
@@ -118,6 +124,10 @@ impl FlightArgs {
     pub(crate) fn clock(&self) -> Option<FlightClock> {
         let start_s = Some(self.start?);
         Some(FlightClock { start_s, speed: self.speed, tolerance_s: self.clock_tolerance })
+    }
+
+    pub(crate) fn journal(&self) -> Option<PathBuf> {
+        self.journal.clone()
     }
 
     /// Returns the network of a node that is reached at some endpoints.

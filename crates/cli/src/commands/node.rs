@@ -150,6 +150,7 @@ fn fly(args: &NodeArgs, clock: FlightClock, console: Console) -> Result<ExitCode
         network: args.flight.network(&args.listen),
         plant: args.mavlink.plant(args.patience_s()).unwrap_or_else(|| args.guard.plant()),
         guard: args.guard.settings(),
+        journal: args.flight.journal(),
     }));
     let mut end = FlightStatus::default();
     let mut state = String::new();

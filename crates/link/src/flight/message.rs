@@ -2,6 +2,7 @@
 
 use crate::protocol::{AgentPacket, NodeStatusReport};
 use serde::{Deserialize, Serialize};
+use sidestep::kernel::EntityId;
 use sidestep::kernel::digest::Digest;
 use sidestep::worlds::airspace::replica::AirplaneReport;
 
@@ -31,8 +32,8 @@ pub enum FlightContent {
     Packets(Vec<AgentPacket>),
     /// Node to nodes, after it was started again: what did I report last?
     Recall,
-    /// Node to node: the last report of the receiver that the sender has.
-    Recalled(Box<FlightReport>),
+    /// Node to node: what the sender remembers of the receiver.
+    Recalled(Box<RecallAnswer>),
     /// Node to recorder: its state.
     Status(NodeStatusReport),
 }
@@ -55,6 +56,15 @@ pub struct FlightReport {
     pub control: Option<Vec<u8>>,
     /// Whether its vehicle flies its reference.
     pub standing: Standing,
+}
+
+/// What a node remembers for another one that was started again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RecallAnswer {
+    /// The last report of the receiver that the sender has.
+    pub report: FlightReport,
+    /// The airplanes whose flights have ended, as far as the sender knows: they need not answer anymore.
+    pub ended: Vec<EntityId>,
 }
 
 /// Whether a vehicle flies its reference.

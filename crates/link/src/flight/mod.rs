@@ -17,6 +17,7 @@
 //! board.rs     what a node's program and its guard share: the reference, and what the guard does
 //! fence.rs     the area that an aircraft must not leave
 //! guard.rs     the guard
+//! journal.rs   what an airplane has reported last, for its node when it is started again
 //! node.rs      the program of the node
 //! recorder.rs  the recorder, which only listens
 //! ```
@@ -25,6 +26,7 @@ pub mod board;
 pub mod channel;
 pub mod fence;
 pub mod guard;
+pub mod journal;
 pub mod message;
 pub mod node;
 pub mod recorder;

@@ -10,7 +10,8 @@
 
 use super::board::{FlightBoard, GuardReport};
 use super::channel::{FlightChannel, ReceivedContent};
-use super::message::{FlightContent, FlightReport, Presence, Standing};
+use super::journal::FlightJournal;
+use super::message::{FlightContent, FlightReport, Presence, RecallAnswer, Standing};
 use super::time::{FlightTime, WallClock, wait_until};
 use crate::plant::aircraft::TrafficReport;
 use crate::protocol::{AgentPacket, NodeStatusReport};
@@ -66,9 +67,11 @@ pub enum FlightError {
     /// Not all were there at the start.
     #[error("the flight has not begun: {0}")]
     NotAllThere(String),
-    /// It was started again, and nobody remembers it.
-    #[error("cycle 0 has begun already, and no other node remembers this airplane")]
-    NotRemembered,
+    /// It was started again, and cannot know what it has reported last.
+    #[error(
+        "cycle 0 has begun already, and it is not known what this airplane has reported last: {0}"
+    )]
+    NotRemembered(String),
 }
 
 /// What a node works with.
@@ -81,6 +84,8 @@ pub struct FlightParts {
     pub channel: FlightChannel,
     /// What it shares with its guard.
     pub board: Arc<FlightBoard>,
+    /// Where it keeps what it reports, if it does.
+    pub journal: Option<FlightJournal>,
 }
 
 /// Settings of a node.
@@ -122,8 +127,10 @@ pub struct FlightNode<'a> {
     own_report: Option<FlightReport>,
     repeat_at_s: f64,
     repeat_after_s: f64,
-    /// The answers to the question what it has reported last.
-    recalled: Option<FlightReport>,
+    /// The answers of others to the question what it has reported last.
+    recalled: BTreeMap<EntityId, RecallAnswer>,
+    /// The first cycle on which it may agree with others.
+    talks_from: Cycle,
     /// The conversation of the present cycle, if there is one: its first tick, and when that was.
     talk: Option<(u64, Instant)>,
     report_at: Instant,
@@ -165,7 +172,8 @@ impl<'a> FlightNode<'a> {
             own_report: None,
             repeat_at_s: f64::INFINITY,
             repeat_after_s: 0.0,
-            recalled: None,
+            recalled: BTreeMap::new(),
+            talks_from: 0,
             talk: None,
             report_at: Instant::now(),
             state: "waits",
@@ -301,36 +309,27 @@ impl<'a> FlightNode<'a> {
         Ok(())
     }
 
-    /// Takes up the flight again: asks the others what it has reported last, and goes on along the fallback from there.
+    /// Takes up the flight again: goes on along the fallback that it has reported last.
     fn resume(&mut self) -> Result<(), FlightError> {
         self.state = "returns";
         self.parts.channel.set_start(self.time.start_s);
-        let cycle_s = self.time.dt_s / self.settings.speed;
-        // Of several answers the newest counts, so that all have the time of two cycles; and links have to open first.
-        let until_s = self.clock.now_s() + (2.0 * cycle_s).max(2.0);
-        let mut ask_at = Instant::now();
-        while self.clock.now_s() < until_s {
-            if (self.has_to_end)() {
-                return Err(FlightError::Interrupted);
-            }
-            self.parts.board.beat();
-            if ask_at <= Instant::now() {
-                ask_at = Instant::now() + PRESENCE_INTERVAL;
-                self.send_presence();
-                let others = self.others.iter().map(|&other| PeerId::Node(other));
-                let to: Vec<PeerId> = others.collect();
-                self.parts.channel.send(&to, FlightContent::Recall);
-            }
-            self.tell_status(false);
-            self.receive(PRESENCE_INTERVAL);
-        }
-        let last = self.recalled.take().ok_or(FlightError::NotRemembered)?;
+        let journal = self.parts.journal.as_ref();
+        let last = match journal.and_then(|journal| journal.load(self.time.start_s)) {
+            Some(last) => last,
+            None => self.recall()?,
+        };
         let replica = &mut self.parts.replica;
-        replica.resume(&last.report).map_err(|_| FlightError::NotRemembered)?;
+        let resumed = replica.resume(&last.report);
+        resumed.map_err(|_| FlightError::NotRemembered("the last report is impossible".into()))?;
+        // The recorder may not have it, if the process before ended while it was sent.
+        let content = FlightContent::Report(Box::new(last.clone()));
+        self.parts.channel.send(&[PeerId::Server], content);
         let now_s = self.clock.now_s();
         let flown = self.time.cycle_at(now_s).unwrap_or(0);
-        while replica.cycle() < flown {
-            replica.advance(None);
+        // The process before may have agreed with others on the cycle that is decided now.
+        self.talks_from = flown + 2;
+        while self.parts.replica.cycle() < flown {
+            self.parts.replica.advance(None);
         }
         // From now on the guard leads and judges: before, nobody could say where the vehicle is to be.
         self.put_reference();
@@ -339,8 +338,54 @@ impl<'a> FlightNode<'a> {
         if self.parts.replica.cycle() == flown && self.time.scenario_s(now_s) >= 0.0 {
             self.parts.replica.advance(None);
         }
+        if last.report.cycle == self.parts.replica.cycle() {
+            // The same report again, with the control that is flown until then.
+            self.own_report = Some(last);
+        }
         self.count("returns");
         Ok(())
+    }
+
+    /// Asks all others what it has reported last, and returns the newest that anyone has heard.
+    ///
+    /// Each of those that fly has to answer: one of them may have agreed with a fallback of which no other has heard.
+    fn recall(&mut self) -> Result<FlightReport, FlightError> {
+        let mut ask_at = Instant::now();
+        loop {
+            let silent = self.others_without_answer();
+            if silent.is_empty() {
+                let answers = std::mem::take(&mut self.recalled);
+                let reports = answers.into_values().map(|answer| answer.report);
+                let newest = reports.max_by_key(|report| report.report.cycle);
+                return newest.ok_or_else(|| FlightError::NotRemembered("it flies alone".into()));
+            }
+            let flown = self.time.cycle_at(self.clock.now_s()).unwrap_or(0);
+            if flown >= self.settings.cycles {
+                let ids: Vec<String> = silent.iter().map(EntityId::to_string).collect();
+                let reason = format!("airplanes {} have not answered", ids.join(", "));
+                return Err(FlightError::NotRemembered(reason));
+            }
+            if (self.has_to_end)() {
+                return Err(FlightError::Interrupted);
+            }
+            self.parts.board.beat();
+            if ask_at <= Instant::now() {
+                ask_at = Instant::now() + PRESENCE_INTERVAL;
+                self.send_presence();
+                let to: Vec<PeerId> = silent.into_iter().map(PeerId::Node).collect();
+                self.parts.channel.send(&to, FlightContent::Recall);
+            }
+            self.tell_status(false);
+            self.receive(PRESENCE_INTERVAL);
+        }
+    }
+
+    /// Returns those that still fly, and have not said what they remember.
+    fn others_without_answer(&self) -> Vec<EntityId> {
+        let has_ended =
+            |id: &EntityId| self.recalled.values().any(|answer| answer.ended.contains(id));
+        let others = self.others.iter().copied();
+        others.filter(|id| !self.recalled.contains_key(id) && !has_ended(id)).collect()
     }
 
     /// Sends the report for the cycle that is decided, and takes those that came early.
@@ -354,7 +399,9 @@ impl<'a> FlightNode<'a> {
         let standing = self.standing();
         let control = self.own_report.take().and_then(|report| report.control);
         let report = self.parts.replica.report();
-        self.own_report = Some(FlightReport { report, control, standing });
+        let report = FlightReport { report, control, standing };
+        self.keep(&report);
+        self.own_report = Some(report);
         let cycle_s = self.time.dt_s / self.settings.speed;
         self.repeat_after_s = FIRST_REPEAT_SHARE * TimeShares::DEFAULT.reports * cycle_s;
         self.repeat_at_s = f64::NEG_INFINITY;
@@ -363,6 +410,15 @@ impl<'a> FlightNode<'a> {
         let due = std::mem::replace(&mut self.early_reports, later);
         for (_, report) in due {
             self.on_report(report);
+        }
+    }
+
+    /// Writes a report down before anybody can hear it.
+    fn keep(&mut self, report: &FlightReport) {
+        let Some(journal) = &self.parts.journal else { return };
+        if let Err(error) = journal.store(self.time.start_s, report) {
+            tracing::warn!(%error, "the journal cannot be written: a node that is started again asks the others");
+            self.count("journal-errors");
         }
     }
 
@@ -416,6 +472,11 @@ impl<'a> FlightNode<'a> {
             self.count(if missing.is_empty() { "late-cycles" } else { "unheard-cycles" });
             self.state = "orbits";
             return Ok(Some(self.parts.pilot.stay_on_fallback(cycle, &missing)));
+        }
+        if cycle < self.talks_from {
+            self.count("quiet-cycles");
+            self.state = "orbits";
+            return Ok(Some(self.parts.pilot.stay_on_fallback(cycle, &[])));
         }
         let percept = self.parts.replica.percept();
         // What others report is checked; what follows from it cannot make the pilot fail.
@@ -603,7 +664,7 @@ impl<'a> FlightNode<'a> {
                 self.present.insert(from, Instant::now());
             }
             FlightContent::Recall => self.on_recall(from),
-            FlightContent::Recalled(report) => self.on_recalled(*report),
+            FlightContent::Recalled(answer) => self.on_recalled(from, *answer),
             // A dead radio hears nothing.
             _ if self.parts.replica.is_radio_off() => {}
             FlightContent::Report(report) if report.report.id != from => self.count("forged"),
@@ -628,18 +689,19 @@ impl<'a> FlightNode<'a> {
         }
     }
 
+    /// Answers what another one has reported last. One that was started again, and has not heard it since, does not know what
+    /// it has heard before, so it does not answer.
     fn on_recall(&mut self, from: EntityId) {
-        if let Some(report) = self.last_reports.get(&from) {
-            let content = FlightContent::Recalled(Box::new(report.clone()));
-            self.parts.channel.send(&[PeerId::Node(from)], content);
-        }
+        let Some(report) = self.last_reports.get(&from) else { return };
+        let replica = &self.parts.replica;
+        let ended = self.others.iter().copied().filter(|&other| replica.has_ended(other)).collect();
+        let answer = RecallAnswer { report: report.clone(), ended };
+        self.parts.channel.send(&[PeerId::Node(from)], FlightContent::Recalled(Box::new(answer)));
     }
 
-    fn on_recalled(&mut self, report: FlightReport) {
-        let is_own = report.report.id == self.id;
-        let newest = self.recalled.as_ref().map(|known| known.report.cycle);
-        if is_own && newest.is_none_or(|newest| report.report.cycle > newest) {
-            self.recalled = Some(report);
+    fn on_recalled(&mut self, from: EntityId, answer: RecallAnswer) {
+        if answer.report.report.id == self.id {
+            self.recalled.insert(from, answer);
         }
     }
 

@@ -31,6 +31,9 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(500);
 const PATIENCE_CYCLES: f64 = 3.0;
 const MIN_PATIENCE_S: f64 = 5.0;
 
+/// The same for a node of which it has heard nothing since: it may be started again, and tell what it has flown before.
+const MIN_PATIENCE_WITH_SILENT_S: f64 = 20.0;
+
 /// Time between the moment when all are ready and the cycle before the first: the start has to reach all.
 const START_DELAY_S: f64 = 1.0;
 
@@ -192,15 +195,22 @@ impl<'a> FlightRecorder<'a> {
 
     /// Returns whether the present cycle can be computed: all have said what they fly in it, or there was time enough.
     fn is_cycle_complete(&self) -> bool {
-        let cycle = self.run.cycle();
-        let flown = self.reports.get(&(cycle + 1));
-        let is_known = |agent: EntityId| flown.is_some_and(|all| all.contains_key(&agent));
-        let mut flying = self.run.all_agents().filter(|&agent| !self.has_ended(agent));
-        if flying.all(is_known) {
-            return true;
-        }
+        let ends_s = self.time.cycle_at_s(self.run.cycle() as i64, 1.0);
+        let waited_s = self.clock.now_s() - ends_s;
         let patience_s = (PATIENCE_CYCLES * self.time.dt_s / self.time.speed).max(MIN_PATIENCE_S);
-        self.clock.now_s() >= self.time.cycle_at_s(cycle as i64, 1.0) + patience_s
+        let mut flying = self.run.all_agents().filter(|&agent| !self.has_ended(agent));
+        flying.all(|agent| match self.next_report(agent) {
+            Some(cycle) if cycle == self.run.cycle() + 1 => true,
+            // It reports one after the other, so the one before is lost.
+            Some(_) => waited_s >= patience_s,
+            None => waited_s >= patience_s.max(MIN_PATIENCE_WITH_SILENT_S),
+        })
+    }
+
+    /// Returns the cycle of the earliest report of an airplane that is still to be recorded.
+    fn next_report(&self, agent: EntityId) -> Option<Cycle> {
+        let ahead = self.reports.range(self.run.cycle() + 1..);
+        ahead.into_iter().find(|(_, all)| all.contains_key(&agent)).map(|(&cycle, _)| cycle)
     }
 
     fn airspace(&self) -> Option<&AirspaceRun> {

@@ -4,6 +4,7 @@ use super::board::FlightBoard;
 use super::channel::{ChannelConfig, FlightChannel};
 use super::fence::Fence;
 use super::guard::{Guard, GuardLimits};
+use super::journal::FlightJournal;
 use super::message::flight_number;
 use super::node::{FlightError, FlightNode, FlightParts, FlightSettings};
 use super::recorder::{FlightRecorder, RecorderHooks};
@@ -49,6 +50,8 @@ struct FlightTest {
     text: Arc<str>,
     hub: MemoryHub,
     tolerance_s: f64,
+    /// The folder of journals, if nodes have them.
+    journals: Option<Arc<tempfile::TempDir>>,
 }
 
 /// One node in threads of its own.
@@ -59,7 +62,19 @@ struct NodeThread {
 
 impl FlightTest {
     fn new(text: &str) -> Self {
-        Self { text: text.into(), hub: MemoryHub::default(), tolerance_s: 10.0 }
+        Self { text: text.into(), hub: MemoryHub::default(), tolerance_s: 10.0, journals: None }
+    }
+
+    fn with_journals(text: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        Self { journals: Some(Arc::new(folder)), ..Self::new(text) }
+    }
+
+    fn journal(&self, id: EntityId) -> Option<FlightJournal> {
+        let (source, _) = self.compiled();
+        let flight = flight_number(&source.text, "test", SPEED);
+        let folder = self.journals.as_ref()?;
+        Some(FlightJournal::new(folder.path().join(format!("{id}.journal")), flight))
     }
 
     fn compiled(&self) -> (Source, Box<dyn CompiledScenario>) {
@@ -106,6 +121,7 @@ impl FlightTest {
             pilot: Pilot::new(world.clone(), id, Default::default()),
             channel: self.channel(PeerId::Node(id), clock),
             board: Arc::clone(&board),
+            journal: self.journal(id),
         };
         let patience_s = TEST_TIMEOUT.as_secs_f64();
         let settings = FlightSettings {
@@ -257,6 +273,52 @@ fn losses_and_a_node_that_is_gone_and_returns_make_no_pair_lose_separation() {
     assert_eq!(recorded.status.nodes[2].lives, 2);
 }
 
+/// Ends two nodes at the same time in the middle of a flight, and starts them again. Returns what was recorded, and how the
+/// two have ended.
+fn restart_two(test: &FlightTest) -> (Recorded, Vec<Result<FlightStatus, FlightError>>) {
+    let mut nodes: Vec<Option<NodeThread>> =
+        (0..4).map(|id| Some(test.start_node(id, None, 0.0))).collect();
+    let gone = [1, 2].map(|id: usize| nodes[id].take().expect("a node"));
+    let mut returned: Vec<NodeThread> = Vec::new();
+    let recorded = test.record(&mut |start_s, status| {
+        if status.cycle >= 7 {
+            gone.iter().for_each(|node| node.has_to_end.store(true, Ordering::Relaxed));
+        }
+        if returned.is_empty() && gone.iter().all(|node| node.thread.is_finished()) {
+            returned.extend([1, 2].map(|id| test.start_node(id, start_s, 0.0)));
+        }
+    });
+    for node in nodes.into_iter().flatten() {
+        node.thread.join().expect("no panic").expect("flown");
+    }
+    let ends = returned.into_iter().map(|node| node.thread.join().expect("no panic"));
+    (recorded, ends.collect())
+}
+
+#[test]
+fn nodes_that_end_at_the_same_time_go_on_by_their_journals_and_are_recorded_as_they_fly() {
+    let test = FlightTest::with_journals(&ring(4, 30, "loss = 0.3\nmax_delay_s = 0.02"));
+    let (recorded, ends) = restart_two(&test);
+    assert!(ends.iter().all(Result::is_ok), "{ends:?}");
+    recorded.check_separation();
+    assert_eq!(recorded.counted("returns"), 2);
+    assert!(recorded.counted("quiet-cycles") <= 2, "{:?}", recorded.status);
+    let differing: u64 = recorded.status.nodes.iter().map(|node| node.differing).sum();
+    assert_eq!(differing, 0, "{:?}", recorded.status);
+}
+
+#[test]
+fn nodes_without_journals_that_end_at_the_same_time_do_not_fly_again_because_nobody_remembers_all()
+{
+    let test = FlightTest::new(&ring(4, 20, "loss = 0.2\nmax_delay_s = 0.02"));
+    let (recorded, ends) = restart_two(&test);
+    for ended in ends {
+        let Err(FlightError::NotRemembered(reason)) = ended else { panic!("{ended:?}") };
+        assert!(reason.contains("have not answered"), "{reason}");
+    }
+    recorded.check_separation();
+}
+
 #[test]
 fn a_clock_that_is_off_makes_its_reports_count_as_missing_and_no_pair_lose_separation() {
     let mut test = FlightTest::new(&ring(3, 16, ""));
@@ -293,5 +355,7 @@ fn a_node_of_a_flight_that_nobody_remembers_does_not_set_out() {
     let test = FlightTest::new(&ring(2, 10, ""));
     let start_s = WallClock::system().now_s() - 100.0;
     let node = test.start_node(0, Some(start_s), 0.0);
-    assert_eq!(node.thread.join().expect("no panic"), Err(FlightError::NotRemembered));
+    let ended = node.thread.join().expect("no panic");
+    let Err(FlightError::NotRemembered(reason)) = ended else { panic!("{ended:?}") };
+    assert!(reason.contains("airplanes 1 have not answered"), "{reason}");
 }

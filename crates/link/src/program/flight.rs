@@ -10,6 +10,7 @@ use crate::flight::board::FlightBoard;
 use crate::flight::channel::{ChannelConfig, FlightChannel};
 use crate::flight::fence::Fence;
 use crate::flight::guard::{Guard, GuardLimits};
+use crate::flight::journal::FlightJournal;
 use crate::flight::message::flight_number;
 use crate::flight::node::{FlightError, FlightNode, FlightParts, FlightSettings};
 use crate::flight::time::WallClock;
@@ -135,6 +136,7 @@ pub(super) fn run(job: &FlightJob, parent: &ParentMonitor) -> Result<(), Error> 
         pilot: pilot.with_build_id(WORLDS.build()),
         channel,
         board: Arc::clone(&board),
+        journal: job.journal.clone().map(|path| FlightJournal::new(path, flown.flight)),
     };
     let settings = FlightSettings {
         start_s: job.clock.start_s,
@@ -278,7 +280,9 @@ fn flight_error(error: FlightError) -> Error {
         FlightError::NotAllThere(_) => {
             "start all nodes before --start, with the same scenario, and see whether they reach each other"
         }
-        FlightError::NotRemembered => "start the flight again, with --start in the time to come",
+        FlightError::NotRemembered(_) => {
+            "give --journal FILE to this node when it is started first: then it knows by itself; or start the flight again"
+        }
     };
     Error::other(error.to_string(), remedy)
 }

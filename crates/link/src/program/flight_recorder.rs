@@ -25,6 +25,7 @@ use sidestep_session::fleet::{
 };
 use sidestep_session::{Error, ManagedRun, OutputPaths};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Records a flight to its end, or until the parent process ends it.
 ///
@@ -54,7 +55,12 @@ pub(super) fn run(job: &FlightRecorderJob, parent: &ParentMonitor) -> Result<(),
     run.note_removals(&WarningLogger);
     // Nodes bind their ports themselves.
     drop(ports);
-    let jobs = node_jobs(job, &nodes, world.as_ref());
+    // It is removed with the flight's end.
+    let journals = tempfile::tempdir().map_err(|error| {
+        let cause = format!("the journals of the nodes have no folder: {error}");
+        Error::other(cause, "set TMPDIR to a folder that can be written")
+    })?;
+    let jobs = node_jobs(job, &nodes, world.as_ref(), journals.path());
     let children = NodeProcesses::start(jobs, true)?;
     let peers: Vec<String> = nodes.into_iter().chain(job.network.peers.iter().cloned()).collect();
     let options =
@@ -117,6 +123,7 @@ fn node_jobs(
     job: &FlightRecorderJob,
     endpoints: &[String],
     world: &dyn DistributedWorld,
+    journals: &Path,
 ) -> BTreeMap<EntityId, Job> {
     let mut jobs = BTreeMap::new();
     for (agent, endpoint) in (0..).zip(endpoints) {
@@ -134,6 +141,7 @@ fn node_jobs(
             },
             plant: job.plant.clone(),
             guard: job.guard.clone(),
+            journal: Some(journals.join(format!("airplane-{agent}.journal"))),
         };
         jobs.insert(agent, Job::Flight(Box::new(node)));
     }

@@ -34,7 +34,12 @@ impl FlightPlan {
         for k in 0..u64::from(count % 6) {
             let [gap, who, what, how_long] = streams.block(round, k, Purpose(2), 0);
             at += Duration::from_millis(500 + u64::from(gap % 5_000));
-            faults.push((at, who % airplanes, ProcessFault::random(what, how_long)));
+            let fault = ProcessFault::random(what, how_long);
+            faults.push((at, who % airplanes, fault));
+            // Often two at the same time: they forget each other.
+            if gap % 3 == 0 {
+                faults.push((at, (who + 1) % airplanes, fault));
+            }
         }
         Self { airplanes, loss: f64::from(percent % 31) / 100.0, faults }
     }
@@ -101,6 +106,9 @@ fn flights_whose_nodes_are_killed_and_stopped_stay_apart_and_are_replayed() {
         assert_eq!(summary["status"], "complete", "{summary}");
         assert_eq!(program.end(), (Some(0), None));
         wait_until_gone(&fleet, Duration::from_secs(60));
+        if summary["metrics"]["losses_of_separation"] != 0 {
+            println!("  {fleet:?}");
+        }
         check_recording(folder.path(), &summary);
         let lives: u64 = fleet.nodes.iter().map(|node| u64::from(node.lives)).sum();
         let names = ["late-controls", "unheard-cycles", "handed-over"];

@@ -131,6 +131,7 @@ fn nodes_that_are_started_one_by_one_find_each_other_by_listed_endpoints() {
             },
             plant: plant(),
             guard: guard(),
+            journal: None,
         };
         let node = LinkProcess::start(&Job::Flight(Box::new(node)));
         let listens = node.until("its endpoint", |message| match message {

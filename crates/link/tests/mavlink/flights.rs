@@ -217,6 +217,7 @@ impl Flight {
                 },
                 plant: PlantChoice::Mavlink(mavlink(*port)),
                 guard: guard.clone(),
+                journal: Some(folder.join(format!("airplane-{airplane}.journal"))),
             };
             let node = Node::start(job);
             peers.extend(node.process.endpoints());
