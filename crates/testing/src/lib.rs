@@ -1,7 +1,9 @@
 //! Helpers that the tests of several crates share.
 
+mod json_process;
 mod process_faults;
 
+pub use json_process::JsonProcess;
 pub use process_faults::{ProcessFault, StoppedProcesses, try_signal};
 
 use std::fmt::Display;

@@ -2,8 +2,8 @@
 
 use crate::protocol::{AgentPacket, NodeStatusReport};
 use serde::{Deserialize, Serialize};
-use sidestep::kernel::EntityId;
 use sidestep::kernel::digest::Digest;
+use sidestep::kernel::{Cycle, EntityId};
 use sidestep::worlds::airspace::replica::AirplaneReport;
 
 /// A message, with what tells whether it belongs to the flight.
@@ -36,6 +36,8 @@ pub enum FlightContent {
     Recalled(Box<RecallAnswer>),
     /// Node to recorder: its state.
     Status(NodeStatusReport),
+    /// Recorder to node: it has the report for this cycle.
+    Received(Cycle),
 }
 
 /// The state of a node before the start.

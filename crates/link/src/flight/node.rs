@@ -52,6 +52,9 @@ pub const DECISION_P50_MS: &str = "decision-p50-ms";
 /// See [`DECISION_P50_MS`].
 pub const DECISION_P99_MS: &str = "decision-p99-ms";
 
+/// Most reports that are sent again to a recorder that has not received them.
+const MAX_UNRECORDED: usize = 64;
+
 /// Most packets that are kept for a conversation that has not begun here.
 const MAX_EARLY_PACKETS: usize = 10_000;
 
@@ -127,6 +130,9 @@ pub struct FlightNode<'a> {
     own_report: Option<FlightReport>,
     repeat_at_s: f64,
     repeat_after_s: f64,
+    /// Reports that the recorder has not received yet, if there is one that answers.
+    unrecorded: BTreeMap<Cycle, FlightReport>,
+    is_recorded: bool,
     /// The answers of others to the question what it has reported last.
     recalled: BTreeMap<EntityId, RecallAnswer>,
     /// The first cycle on which it may agree with others.
@@ -172,6 +178,8 @@ impl<'a> FlightNode<'a> {
             own_report: None,
             repeat_at_s: f64::INFINITY,
             repeat_after_s: 0.0,
+            unrecorded: BTreeMap::new(),
+            is_recorded: false,
             recalled: BTreeMap::new(),
             talks_from: 0,
             talk: None,
@@ -322,8 +330,7 @@ impl<'a> FlightNode<'a> {
         let resumed = replica.resume(&last.report);
         resumed.map_err(|_| FlightError::NotRemembered("the last report is impossible".into()))?;
         // The recorder may not have it, if the process before ended while it was sent.
-        let content = FlightContent::Report(Box::new(last.clone()));
-        self.parts.channel.send(&[PeerId::Server], content);
+        self.unrecorded.insert(last.report.cycle, last.clone());
         let now_s = self.clock.now_s();
         let flown = self.time.cycle_at(now_s).unwrap_or(0);
         // The process before may have agreed with others on the cycle that is decided now.
@@ -401,6 +408,12 @@ impl<'a> FlightNode<'a> {
         let report = self.parts.replica.report();
         let report = FlightReport { report, control, standing };
         self.keep(&report);
+        self.unrecorded.insert(cycle, report.clone());
+        while self.unrecorded.len() > MAX_UNRECORDED
+            || !self.is_recorded && self.unrecorded.len() > 2
+        {
+            self.unrecorded.pop_first();
+        }
         self.own_report = Some(report);
         let cycle_s = self.time.dt_s / self.settings.speed;
         self.repeat_after_s = FIRST_REPEAT_SHARE * TimeShares::DEFAULT.reports * cycle_s;
@@ -445,7 +458,11 @@ impl<'a> FlightNode<'a> {
         let content = FlightContent::Report(Box::new(report.clone()));
         self.repeat_at_s = now_s + self.repeat_after_s;
         self.repeat_after_s *= 2.0;
-        self.parts.channel.send(&[PeerId::Server], content.clone());
+        // A link that breaks loses what was sent before the other end noticed.
+        for unrecorded in self.unrecorded.values() {
+            let content = FlightContent::Report(Box::new(unrecorded.clone()));
+            self.parts.channel.send(&[PeerId::Server], content);
+        }
         if !self.parts.replica.is_radio_off() {
             self.parts.channel.broadcast(&self.others, content);
         }
@@ -674,12 +691,18 @@ impl<'a> FlightNode<'a> {
             FlightContent::Packets(packets) => {
                 packets.iter().for_each(|packet| self.on_packet(from, packet));
             }
-            FlightContent::Start | FlightContent::Status(_) => self.count("strangers"),
+            FlightContent::Start | FlightContent::Status(_) | FlightContent::Received(_) => {
+                self.count("strangers");
+            }
         }
     }
 
-    /// Takes the start, where the recorder says it.
+    /// Takes the start, where the recorder says it, and what it has received.
     fn on_recorder(&mut self, content: &FlightContent, start_s: Option<f64>) {
+        if let FlightContent::Received(cycle) = content {
+            self.is_recorded = true;
+            self.unrecorded.remove(cycle);
+        }
         let is_awaited = self.settings.start_s.is_none() && !self.time.start_s.is_finite();
         if let (FlightContent::Start, Some(start_s), true) = (content, start_s, is_awaited)
             && start_s.is_finite()

@@ -187,6 +187,7 @@ impl<'a> FlightRecorder<'a> {
                 if cycle >= self.run.cycle() {
                     self.reports.entry(cycle).or_default().entry(agent).or_insert(*report);
                 }
+                self.channel.send(&[PeerId::Node(agent)], FlightContent::Received(cycle));
             }
             // All else is not for a recorder.
             _ => {}

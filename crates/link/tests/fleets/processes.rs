@@ -8,11 +8,11 @@ use sidestep_session::fleet::{
     Topology, link_command,
 };
 use sidestep_session::{ManagedRun, NoWatcher, RunStatus};
-use sidestep_testing::try_signal;
-use std::io::{BufRead, BufReader, Write};
+use sidestep_testing::{JsonProcess, try_signal};
+use std::io::{BufRead, BufReader};
+use std::ops::{Deref, DerefMut};
 use std::path::Path;
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -53,9 +53,7 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJ
 
 /// A program that does a job. It is killed when it is dropped.
 pub(crate) struct LinkProcess {
-    pub(crate) child: Child,
-    pub(crate) stdin: Option<ChildStdin>,
-    messages: Receiver<LinkMessage>,
+    process: JsonProcess<LinkMessage>,
     /// The lines that it, and the nodes that it starts, have logged so far.
     logged: Arc<Mutex<Vec<String>>>,
 }
@@ -73,9 +71,9 @@ impl LinkProcess {
     }
 
     pub(crate) fn start_by(mut command: Command, job: &Job) -> Self {
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().expect("the program starts");
-        let errors = BufReader::new(child.stderr.take().expect("a pipe"));
+        command.stderr(Stdio::piped());
+        let mut process = JsonProcess::start_with(command, job);
+        let errors = BufReader::new(process.child.stderr.take().expect("a pipe"));
         let logged = Arc::new(Mutex::new(Vec::new()));
         let log = logged.clone();
         std::thread::spawn(move || {
@@ -83,17 +81,7 @@ impl LinkProcess {
                 log.lock().expect("no panic").push(line);
             }
         });
-        let mut stdin = child.stdin.take().expect("a pipe");
-        let line = serde_json::to_string(job).expect("plain data");
-        writeln!(stdin, "{line}").expect("it reads its job");
-        let out = BufReader::new(child.stdout.take().expect("a pipe"));
-        let (sender, messages) = channel();
-        std::thread::spawn(move || {
-            for line in out.lines().map_while(Result::ok) {
-                let _ = sender.send(serde_json::from_str(&line).expect("a line that is known"));
-            }
-        });
-        Self { child, stdin: Some(stdin), messages, logged }
+        Self { process, logged }
     }
 
     /// Returns the lines that were logged so far.
@@ -116,7 +104,7 @@ impl LinkProcess {
         let until = Instant::now() + within;
         loop {
             let message =
-                self.messages.recv_timeout(until.saturating_duration_since(Instant::now()));
+                self.process.lines.recv_timeout(until.saturating_duration_since(Instant::now()));
             let message = message.unwrap_or_else(|e| {
                 let logged = self.logged().join("\n");
                 panic!("waited for {what}: {e}; it logged:\n{logged}")
@@ -161,8 +149,8 @@ impl LinkProcess {
 
     /// Returns the exit code, and the reason if it failed.
     pub(crate) fn end(mut self) -> (Option<i32>, Option<JobError>) {
-        let status = self.child.wait().expect("it ends");
-        let failed = self.messages.iter().find_map(|message| match message {
+        let status = self.process.child.wait().expect("it ends");
+        let failed = self.process.lines.iter().find_map(|message| match message {
             LinkMessage::Failed(failed) => Some(failed),
             _ => None,
         });
@@ -170,10 +158,17 @@ impl LinkProcess {
     }
 }
 
-impl Drop for LinkProcess {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+impl Deref for LinkProcess {
+    type Target = JsonProcess<LinkMessage>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.process
+    }
+}
+
+impl DerefMut for LinkProcess {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.process
     }
 }
 

@@ -11,11 +11,8 @@ use sidestep_session::fleet::{
     ModelPlantSettings, PlantChoice, link_command,
 };
 use sidestep_session::{NoWatcher, RecordedRun, replay_all};
-use sidestep_testing::{has_modules, root};
-use std::io::{BufRead, BufReader, Write};
+use sidestep_testing::{JsonProcess, has_modules, root};
 use std::path::Path;
-use std::process::{Child, ChildStdin, Stdio};
-use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Meters above the sea at which the scenario's altitude 0 is: 60 m above the home of all vehicles.
@@ -71,51 +68,21 @@ fn vehicle(number: usize, airplane: &AirplaneStart) -> Value {
     })
 }
 
-/// A program that does a job. It is killed when it is dropped.
-struct LinkProcess {
-    child: Child,
-    _stdin: ChildStdin,
-    messages: Receiver<LinkMessage>,
+/// A program that does a job.
+type LinkProcess = JsonProcess<LinkMessage>;
+
+fn start(job: &Job) -> LinkProcess {
+    JsonProcess::start_with(link_command(env!("CARGO_BIN_EXE_sidestep-link")), job)
 }
 
-impl LinkProcess {
-    fn start(job: &Job) -> Self {
-        let mut command = link_command(env!("CARGO_BIN_EXE_sidestep-link"));
-        command.stdin(Stdio::piped()).stdout(Stdio::piped());
-        let mut child = command.spawn().expect("the program starts");
-        let mut stdin = child.stdin.take().expect("a pipe");
-        let line = serde_json::to_string(job).expect("plain data");
-        writeln!(stdin, "{line}").expect("it reads its job");
-        let out = BufReader::new(child.stdout.take().expect("a pipe"));
-        let (sender, messages) = channel();
-        std::thread::spawn(move || {
-            for line in out.lines().map_while(Result::ok) {
-                let _ = sender.send(serde_json::from_str(&line).expect("a line that is known"));
-            }
-        });
-        Self { child, _stdin: stdin, messages }
-    }
-
-    fn next(&self, what: &str) -> LinkMessage {
-        let message = self.messages.recv_timeout(TEST_TIMEOUT);
-        message.unwrap_or_else(|error| panic!("waited for {what}: {error}"))
-    }
-
-    fn endpoints(&self) -> Vec<String> {
-        loop {
-            match self.next("endpoints") {
-                LinkMessage::Listens(endpoints) => return endpoints,
-                LinkMessage::Failed(error) => panic!("{error:?}"),
-                _ => {}
-            }
+/// Waits until a node listens, and returns where.
+fn endpoints(node: &LinkProcess) -> Vec<String> {
+    loop {
+        match node.next("endpoints", TEST_TIMEOUT) {
+            LinkMessage::Listens(endpoints) => return endpoints,
+            LinkMessage::Failed(error) => panic!("{error:?}"),
+            _ => {}
         }
-    }
-}
-
-impl Drop for LinkProcess {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 
@@ -129,7 +96,7 @@ pub(crate) struct Node {
 
 impl Node {
     fn start(job: FlightJob) -> Self {
-        let process = LinkProcess::start(&Job::Flight(Box::new(job.clone())));
+        let process = start(&Job::Flight(Box::new(job.clone())));
         Self { job, process, last: FlightStatus::default(), events: Vec::new() }
     }
 
@@ -140,13 +107,13 @@ impl Node {
     /// Kills the node if it runs, starts it again with the endpoints of all others, and returns where it listens.
     fn restart(&mut self, peers: Vec<String>) -> String {
         self.job.network.peers = peers;
-        self.process = LinkProcess::start(&Job::Flight(Box::new(self.job.clone())));
-        self.process.endpoints().remove(0)
+        self.process = start(&Job::Flight(Box::new(self.job.clone())));
+        endpoints(&self.process).remove(0)
     }
 
     /// Takes what has come.
     fn read(&mut self) {
-        while let Ok(message) = self.process.messages.try_recv() {
+        while let Ok(message) = self.process.lines.try_recv() {
             self.take(message);
         }
     }
@@ -220,7 +187,7 @@ impl Flight {
                 journal: Some(folder.join(format!("airplane-{airplane}.journal"))),
             };
             let node = Node::start(job);
-            peers.extend(node.process.endpoints());
+            peers.extend(endpoints(&node.process));
             nodes.push(node);
         }
         let network =
@@ -235,7 +202,7 @@ impl Flight {
             out: Some(folder.join("run")),
             replace: false,
         };
-        let recorder = LinkProcess::start(&Job::FlightRecorder(Box::new(job)));
+        let recorder = start(&Job::FlightRecorder(Box::new(job)));
         Self { vehicles, nodes, endpoints: peers, recorder }
     }
 
@@ -275,7 +242,7 @@ impl Flight {
 
     /// Returns whether the recorder has told the end.
     pub(crate) fn has_ended(&mut self) -> bool {
-        let messages = self.recorder.messages.try_iter();
+        let messages = self.recorder.lines.try_iter();
         messages.fold(false, |has_ended, message| match message {
             LinkMessage::Ended { .. } => true,
             LinkMessage::Failed(error) => panic!("{error:?}"),

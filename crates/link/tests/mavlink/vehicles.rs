@@ -6,11 +6,9 @@ use sidestep_link::mavlink::{
     FlightLimits, GeoFrame, MavlinkEndpoint, MavlinkOptions, MavlinkPlant, Origin,
 };
 use sidestep_link::plant::aircraft::{AircraftPlant, AircraftState, Setpoint};
-use sidestep_testing::python;
-use std::io::{BufRead, BufReader, Write};
+use sidestep_testing::{JsonProcess, python};
 use std::path::Path;
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Longer than anything here takes, on a machine that has much else to do.
@@ -22,9 +20,7 @@ pub(crate) const ORIGIN: Origin =
 
 /// The vehicles of a test. They end with it.
 pub(crate) struct Vehicles {
-    child: Child,
-    stdin: ChildStdin,
-    lines: Receiver<Value>,
+    process: JsonProcess<Value>,
     pub(crate) ports: Vec<u16>,
 }
 
@@ -36,28 +32,19 @@ impl Vehicles {
         });
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mavlink/vehicle.py");
         let mut command = Command::new(python());
-        command.arg(script).arg(config.to_string()).stdin(Stdio::piped()).stdout(Stdio::piped());
-        let mut child = command.spawn().expect("python starts");
-        let stdin = child.stdin.take().expect("a pipe");
-        let out = BufReader::new(child.stdout.take().expect("a pipe"));
-        let (sender, lines) = channel();
-        std::thread::spawn(move || {
-            for line in out.lines().map_while(Result::ok) {
-                let _ = sender.send(serde_json::from_str(&line).expect("a line of JSON"));
-            }
-        });
-        let mut vehicles = Self { child, stdin, lines, ports: Vec::new() };
+        command.arg(script).arg(config.to_string());
+        let mut vehicles = Self { process: JsonProcess::start(command), ports: Vec::new() };
         let ports = vehicles.next();
         vehicles.ports = serde_json::from_value(ports).expect("ports");
         vehicles
     }
 
     fn next(&self) -> Value {
-        self.lines.recv_timeout(TEST_TIMEOUT).expect("the vehicles answer")
+        self.process.next("an answer of the vehicles", TEST_TIMEOUT)
     }
 
     pub(crate) fn ask(&mut self, request: &Value) -> Value {
-        writeln!(self.stdin, "{request}").expect("the vehicles listen");
+        self.process.write(request);
         self.next()
     }
 
@@ -75,13 +62,6 @@ impl Vehicles {
     /// Connects to a vehicle.
     pub(crate) fn plant(&self, vehicle: usize) -> MavlinkPlant {
         MavlinkPlant::connect(&options(self.ports[vehicle])).expect("a vehicle")
-    }
-}
-
-impl Drop for Vehicles {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 
