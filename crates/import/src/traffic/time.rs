@@ -1,5 +1,7 @@
 //! Times of recordings: seconds and their fractions since 1970, and dates with times of day.
 
+use chrono::{DateTime, NaiveDate};
+
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
 
@@ -115,24 +117,8 @@ fn parse_date(text: &str) -> Option<i64> {
 
 /// Returns the days from 1970-01-01 to a date of the Gregorian calendar; `None` where there is no such date.
 pub(super) fn days_since_1970(year: u32, month: u32, day: u32) -> Option<i64> {
-    let is_leap = year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
-    let days_of_month = match month {
-        2 => 28 + u32::from(is_leap),
-        4 | 6 | 9 | 11 => 30,
-        1..=12 => 31,
-        _ => return None,
-    };
-    if !(1..=days_of_month).contains(&day) {
-        return None;
-    }
-    // Years that begin in March have their leap day at the end.
-    let shifted_year = i64::from(year) - i64::from(month <= 2);
-    let month_from_march = i64::from((month + 9) % 12);
-    let day_of_year = (153 * month_from_march + 2) / 5 + i64::from(day) - 1;
-    let era = shifted_year.div_euclid(400);
-    let year_of_era = shifted_year.rem_euclid(400);
-    let day_of_era = year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year;
-    Some(era * 146_097 + day_of_era - 719_468)
+    let date = NaiveDate::from_ymd_opt(i32::try_from(year).ok()?, month, day)?;
+    Some(date.signed_duration_since(NaiveDate::default()).num_days())
 }
 
 /// Returns a clock without its offset from UTC, and the offset in s; `None` for an offset that is none.
@@ -185,34 +171,17 @@ fn digits(text: &str) -> Option<u32> {
 /// Returns a time in s since 1970 as ISO 8601 in UTC: `2018-08-01T09:00:00Z`, with tenths of a second where it has any.
 pub fn format_utc(time_s: f64) -> String {
     let tenths = (time_s * 10.0).round();
-    if !(-1e14..1e14).contains(&tenths) {
+    // Beyond that the cast would saturate.
+    let is_time = tenths.abs() < 1e17;
+    let time = DateTime::from_timestamp((tenths as i64).div_euclid(10), 0).filter(|_| is_time);
+    let Some(time) = time else {
         return format!("{time_s:e} s since 1970");
-    }
-    let tenths = tenths as i64;
-    let days = tenths.div_euclid(864_000);
-    let of_day = tenths.rem_euclid(864_000);
-    let [year, month, day] = date_of_day(days);
-    let seconds = of_day / 10;
-    let [h, m, s] = [seconds / 3600, seconds / 60 % 60, seconds % 60];
-    let fraction = match of_day % 10 {
+    };
+    let fraction = match (tenths as i64).rem_euclid(10) {
         0 => String::new(),
         tenth => format!(".{tenth}"),
     };
-    format!("{year:04}-{month:02}-{day:02}T{h:02}:{m:02}:{s:02}{fraction}Z")
-}
-
-/// Returns year, month and day of the day that is so many days after 1970-01-01.
-fn date_of_day(days: i64) -> [i64; 3] {
-    let shifted = days + 719_468;
-    let era = shifted.div_euclid(146_097);
-    let day_of_era = shifted.rem_euclid(146_097);
-    let year_of_era =
-        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
-    [year_of_era + era * 400 + i64::from(month <= 2), month, day]
+    format!("{}{fraction}Z", time.format("%Y-%m-%dT%H:%M:%S"))
 }
 
 #[cfg(test)]

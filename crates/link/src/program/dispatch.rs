@@ -6,6 +6,7 @@ use super::parent_monitor::ParentMonitor;
 use crate::vda5050::broker::{Broker, BrokerAddress, BrokerEvent};
 use crate::vda5050::master::{Master, MasterConfig, Remark};
 use crate::vda5050::routes::{FloorFrame, Route, routes};
+use chrono::{DateTime, Utc};
 use sidestep::kernel::InputError;
 use sidestep::planners::DependencyGraph;
 use sidestep::scenario::{CompiledScenario, Source};
@@ -281,28 +282,9 @@ fn since_epoch() -> Duration {
 
 /// Returns a time since 1970 as the standard writes it: ISO 8601, in UTC, with hundredths of a second.
 fn timestamp(since_epoch: Duration) -> String {
-    let seconds = since_epoch.as_secs();
-    let date = date(seconds / 86_400);
-    let [hour, minute, second] = [seconds / 3600 % 24, seconds / 60 % 60, seconds % 60];
+    let time = DateTime::<Utc>::from(UNIX_EPOCH + since_epoch);
     let hundredths = since_epoch.subsec_millis() / 10;
-    format!("{date}T{hour:02}:{minute:02}:{second:02}.{hundredths:02}Z")
-}
-
-/// Returns the date of a day since 1970 in the Gregorian calendar (Howard Hinnant, "chrono-compatible low-level date
-/// algorithms", `civil_from_days`).
-fn date(days: u64) -> String {
-    // Years begin in March: the day that some lack is the last one.
-    let days = days + 719_468;
-    let era = days / 146_097;
-    let day_of_era = days % 146_097;
-    let year_of_era =
-        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
-    let year = year_of_era + 400 * era + u64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02}")
+    format!("{}.{hundredths:02}Z", time.format("%Y-%m-%dT%H:%M:%S"))
 }
 
 #[cfg(test)]
