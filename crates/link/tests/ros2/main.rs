@@ -7,6 +7,7 @@
 mod closed_loop;
 mod drive;
 mod process;
+mod team;
 
 use process::{Peer, RosProcess, job};
 use serde_json::{Value, json};

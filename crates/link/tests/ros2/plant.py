@@ -7,7 +7,8 @@ CONFIG is a JSON object: `port`, at which the router listens; `domain`; `map`, r
 `starts`, a column, a row and a heading in degrees for each robot; `radius_m`; `walls`, further squares that the map of the
 robots does not have, by column and row; `stamped`, whether commands are TwistStamped; `rays` of a laser; `drift_m`, the standard
 deviation of what localization is off, which changes within a quarter of a minute; `pace`, seconds of the robots in a second at most;
-`goals`, whether goals can be sent. Wheels slip, lasers and localization are noisy. Lines on standard input:
+`goals`, whether goals can be sent; `beacon`, the definition of RobotBeacon, whose topics are heard; `stop_after`, steps without a
+command after which a base stops. Wheels slip, lasers and localization are noisy. Lines on standard input:
 
     silence   stop sending measurements; answers when the last command of each robot is zero
     speak     send them again
@@ -25,7 +26,7 @@ import time
 
 import numpy as np
 import zenoh
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zenoh_ros2_sdk import ROS2Publisher, ROS2Subscriber, ZenohSession
 
 CONFIG = json.loads(sys.argv[1])
@@ -47,6 +48,10 @@ MAX_WAIT_S = 1.0
 DEADLINE_S = 120.0
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
+BEACON = "sidestep_msgs/msg/RobotBeacon"
+if "beacon" in CONFIG:
+    TYPES.register(get_types_from_msg(CONFIG["beacon"], BEACON))
+STOP_AFTER = CONFIG.get("stop_after")
 RANDOM = np.random.default_rng(7)
 
 
@@ -93,6 +98,10 @@ class Robot:
         self.is_touching = False
         self.drift = np.zeros(2)
         self.track = []
+        self.steps_alone = 0
+        self.beacon = None
+        if "beacon" in CONFIG:
+            self.told = topic(ROS2Subscriber, f"/{self.name}/beacon", BEACON, self.on_beacon)
         self.odom = topic(ROS2Publisher, f"/{self.name}/odom", "nav_msgs/msg/Odometry")
         self.scan = topic(ROS2Publisher, f"/{self.name}/scan", "sensor_msgs/msg/LaserScan")
         self.bumper = topic(ROS2Publisher, f"/{self.name}/bumper", "std_msgs/msg/Bool")
@@ -100,6 +109,15 @@ class Robot:
         if CONFIG.get("goals"):
             self.goal = topic(ROS2Publisher, f"/{self.name}/goal_pose", "geometry_msgs/msg/PoseStamped")
         self.heard = topic(ROS2Subscriber, f"/{self.name}/cmd_vel", f"geometry_msgs/msg/{kind}", self.on_command)
+
+    def on_beacon(self, message):
+        self.beacon = {
+            "robot": int(message.robot),
+            "at": [int(message.column), int(message.row), int(message.heading)],
+            "has_word": bool(message.has_word),
+            "done": int(message.done) if message.has_done else None,
+            "digest": bytes(bytearray(message.digest)).hex(),
+        }
 
     def on_command(self, message):
         message = getattr(message, "twist", message)
@@ -111,6 +129,9 @@ class Robot:
         return self.velocity == (0.0, 0.0) or self.commands > self.commands_before
 
     def advance(self, others):
+        self.steps_alone = 0 if self.commands > self.commands_before else self.steps_alone + 1
+        if STOP_AFTER and self.steps_alone > STOP_AFTER:
+            self.velocity = (0.0, 0.0)
         self.commands_before = self.commands
         speed, rate = self.velocity
         slip = 1.0 - RANDOM.uniform(0.0, 0.2, 2)
@@ -294,6 +315,7 @@ class Plant:
                 "velocity": robot.velocity,
                 "fastest": robot.fastest,
                 "commands": robot.commands,
+                "beacon": robot.beacon,
             }
             for robot in self.robots
         ]
