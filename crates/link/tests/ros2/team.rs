@@ -32,12 +32,15 @@ fn head(rows: &[&str]) -> String {
 
 fn planned_scenario() -> String {
     let mut text = head(&ROOMS);
+    // One planner leads all: those of a team of its own would take the others for walls.
+    let mut leader = "name = \"all\"\nplanner = { method = \"lacam\" }";
     for ([column, row, degrees], goal) in WAYS {
         let heading = degrees / 90;
         text += &format!(
             "[[robots]]\nat = [[{column}, {row}, {heading}]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
-             behaviour = {{ kind = \"goto\", goals = [{goal:?}] }}\nplanner = {{ method = \"lacam\" }}\n"
+             behaviour = {{ kind = \"goto\", goals = [{goal:?}] }}\n{leader}\n"
         );
+        leader = "team = \"all\"";
     }
     text
 }

@@ -591,11 +591,14 @@ fn door() -> String {
         .to_string();
     let robots =
         [([0, 1, 0], [8, 0]), ([0, 2, 0], [8, 2]), ([8, 0, 2], [0, 1]), ([8, 2, 2], [0, 2])];
+    // One planner leads all: those of a team of its own would take the others for walls.
+    let mut leader = "name = \"all\"\nplanner = { method = \"lacam\" }";
     for (start, goal) in robots {
         text += &format!(
             "[[robots]]\nat = [{start:?}]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
-             behaviour = {{ kind = \"goto\", goals = [{goal:?}] }}\nplanner = {{ method = \"lacam\" }}\n"
+             behaviour = {{ kind = \"goto\", goals = [{goal:?}] }}\n{leader}\n"
         );
+        leader = "team = \"all\"";
     }
     text
 }
@@ -641,6 +644,5 @@ fn robots_with_a_plan_pass_a_door_in_its_order_and_touch_nobody() {
     let waits: u64 = floor.plants.iter().map(|plant| plant.driver.counts().plan_waits).sum();
     assert!(waits > 0, "they cannot all be first");
     let trips: u64 = floor.plants.iter().map(|plant| plant.driver.counts().trips).sum();
-    let ends: Vec<String> = floor.plants.iter().map(|plant| format!("{:?} {:?} {:?}", plant.pose, plant.driver.counts(), plant.driver.plan().map(|plan| (plan.done(), plan.actions())))).collect();
-    assert_eq!(trips, 4, "all arrive: {ends:#?}");
+    assert_eq!(trips, 4, "all arrive");
 }

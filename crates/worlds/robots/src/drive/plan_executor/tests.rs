@@ -6,9 +6,9 @@ use sidestep_scenario::Source;
 fn plan() -> Arc<TeamPlan> {
     let text = "format = 1\nworld = \"robots\"\ncycles = 100\nregime = \"reliable\"\n[map]\nascii = \"\"\"\n\
         ..#...#..\n.........\n..#####..\n\"\"\"\n[[robots]]\nat = [[0, 1, 0]]\n\
-        behaviour = { kind = \"goto\", goals = [[8, 1]] }\nplanner = { method = \"lacam\" }\n\
+        behaviour = { kind = \"goto\", goals = [[8, 1]] }\nname = \"all\"\nplanner = { method = \"lacam\" }\n\
         [[robots]]\nat = [[8, 1, 2]]\nbehaviour = { kind = \"goto\", goals = [[0, 1]] }\n\
-        planner = { method = \"lacam\" }\n";
+        team = \"all\"\n";
     let source = Source::new("s.toml", text, "");
     let compiled = Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial);
     let compiled = compiled.expect("a scenario");
@@ -79,6 +79,7 @@ fn each_computes_the_same_plan_and_both_arrive_in_its_order_however_one_of_them_
         assert_eq!(again.actions(robot), actions);
         assert!((0..=actions).all(|k| plan.pose_after(robot, k) == again.pose_after(robot, k)));
     }
+    assert_eq!(plan.pose_after(0, plan.actions(0)).map(GridPose::position), Some((8, 1)));
     let total: u32 = (0..2).map(|robot| plan.actions(robot)).sum();
     for restart_after in 0..total {
         for restarted in [&[0][..], &[1], &[0, 1]] {
