@@ -181,6 +181,9 @@ fn robots_that_could_not_hear_each_other_or_have_no_plan_are_refused_with_a_reme
         assert!(!refused.remedy.is_empty());
     };
     let text = planned_scenario();
-    fail_with(&text.replace("lacam", "external"), "a program orders");
+    // A program leads the robots of one section only.
+    let external = "planner = { method = \"external\" }";
+    let ordered = text.replace("lacam", "external").replace("team = \"all\"", external);
+    fail_with(&ordered, "a program orders");
     fail_with(&text.replace("regime = \"reliable\"", "regime = \"both\""), "actions that succeed");
 }
