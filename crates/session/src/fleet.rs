@@ -412,6 +412,10 @@ pub struct DriveTopics {
     pub cmd_vel: String,
     /// Goals, `geometry_msgs/msg/PoseStamped`, for a robot that has no behavior of its own.
     pub goal: String,
+    /// What robots tell each other, `sidestep_msgs/msg/RobotBeacon`; with a slash at its beginning it is one for all robots.
+    pub beacon: String,
+    /// The namespaces of the robots, with `{}` for the id; none for that of the robot, with its id at the end.
+    pub peers: Option<String>,
     /// Whether commands have a time: `geometry_msgs/msg/TwistStamped`.
     pub is_stamped: bool,
     /// The frame of the map.
@@ -437,6 +441,8 @@ pub struct DriveSettings {
     pub cycle_s: f64,
     /// Age in seconds of its measurements from which on it stands.
     pub patience_s: f64,
+    /// Age in seconds of the last beacon of another robot from which on that is silent.
+    pub beacon_patience_s: f64,
     /// Time in seconds of an action after which it ends where it is.
     pub timeout_s: f64,
 }
@@ -475,6 +481,48 @@ pub struct DriveStatus {
     pub unreadable: u64,
     /// Messages that were older than the one before, and so were dropped.
     pub outdated: u64,
+    /// What it has told and heard of other robots.
+    #[serde(default)]
+    pub beacons: BeaconCounts,
+    /// Ids of the robots whose words were a part of its last percept.
+    #[serde(default)]
+    pub heard: Vec<EntityId>,
+    /// Ids of the robots that it has heard before, and does not hear anymore.
+    #[serde(default)]
+    pub silent: Vec<EntityId>,
+    /// Its part in a plan, if there is one.
+    #[serde(default)]
+    pub plan: Option<PlanStatus>,
+}
+
+/// Beacons of robots that are driven: those that were told, and those that came and why some were dropped.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BeaconCounts {
+    /// Beacons that it has sent.
+    pub sent: u64,
+    /// Beacons of others that it has taken.
+    pub heard: u64,
+    /// Those that could not be read, or were too many at once.
+    pub unreadable: u64,
+    /// Those of another scenario or plan, and of robots that the scenario does not have.
+    pub foreign: u64,
+    /// Those that were not newer than the one before.
+    pub outdated: u64,
+}
+
+/// The part of a robot in a plan.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlanStatus {
+    /// Number of its actions.
+    pub actions: u32,
+    /// Number of those that it has done; none as long as it does not know.
+    pub done: Option<u32>,
+    /// Times that it began to wait for others.
+    pub waits: u64,
+    /// Why it stands instead of doing the next one.
+    pub hold: Option<String>,
+    /// Ids of the robots for which it waits.
+    pub waits_for: Vec<EntityId>,
 }
 
 /// Distributions of ROS 2 that differ in what they send.

@@ -11,8 +11,8 @@ use serde_json::json;
 use sidestep::kernel::EntityId;
 use sidestep::kernel::text::key_value_pair;
 use sidestep_session::fleet::{
-    CommonSettings, DriveJob, DriveSettings, DriveStatus, DriveTopics, Job, JobScenario,
-    LinkMessage, RosGraph, RosNetwork,
+    BeaconCounts, CommonSettings, DriveJob, DriveSettings, DriveStatus, DriveTopics, Job,
+    JobScenario, LinkMessage, PlanStatus, RosGraph, RosNetwork,
 };
 use std::path::PathBuf;
 
@@ -28,6 +28,9 @@ Examples:
       --set 'robots.2.behaviour={kind=\"external\"}'
                                    it goes where goal_pose says, and its
                                    messages are kept as a bag
+  sidestep drive hall.toml --robot 2 --namespace hall/r2 --peers 'hall/r{}'
+                                   it hears what the programs of the other
+                                   robots tell, and keeps to a common plan
 
 The program sidestep-link does it: `cargo install --path crates/link`. The robot needs no Sidestep: \
 it is a node of rmw_zenoh with odometry or frames, a laser, and a topic for velocities. It stands \
@@ -126,6 +129,15 @@ struct TopicArgs {
     #[arg(long, value_name = "TOPIC", default_value = "goal_pose")]
     goal: String,
 
+    /// What robots tell each other (sidestep_msgs/RobotBeacon)
+    #[arg(long, value_name = "TOPIC", default_value = "beacon")]
+    beacon: String,
+
+    /// Namespaces of all robots with {} for the id, to hear their beacons
+    /// [default: that of this one, if its id is at the end]
+    #[arg(long, value_name = "NS", value_parser = parse_peers)]
+    peers: Option<String>,
+
     /// Send velocities with a time (geometry_msgs/TwistStamped)
     #[arg(long)]
     stamped: bool,
@@ -167,6 +179,10 @@ struct LimitArgs {
     #[arg(long, value_name = "S", default_value_t = 0.5, value_parser = parse_limit)]
     patience: f64,
 
+    /// Seconds without a beacon of another robot after which it is silent
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = parse_limit)]
+    beacon_patience: f64,
+
     /// Seconds of an action that waits
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = parse_limit)]
     cycle: f64,
@@ -179,6 +195,15 @@ struct LimitArgs {
 fn parse_limit(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x| (0.01..=1000.0).contains(x));
     number.ok_or_else(|| "give a number from 0.01 to 1000".into())
+}
+
+fn parse_peers(text: &str) -> Result<String, String> {
+    if text.matches("{}").count() != 1 {
+        return Err("give a namespace with one {} in place of the id, as in robot_{}".into());
+    }
+    // An id stands for all: a namespace is one for each id or for none.
+    parse_namespace(&text.replace("{}", "0"))?;
+    Ok(if text.starts_with('/') { text.into() } else { format!("/{text}") })
 }
 
 fn parse_clearance(text: &str) -> Result<f64, String> {
@@ -237,6 +262,8 @@ impl TopicArgs {
             bumper: self.bumper.clone(),
             cmd_vel: self.cmd_vel.clone(),
             goal: self.goal.clone(),
+            beacon: self.beacon.clone(),
+            peers: self.peers.clone(),
             is_stamped: self.stamped,
             map_frame: self.map_frame.clone(),
             base_frame: self.base.clone(),
@@ -254,6 +281,7 @@ impl LimitArgs {
             clearance_m: self.clearance,
             cycle_s: self.cycle,
             patience_s: self.patience,
+            beacon_patience_s: self.beacon_patience,
             timeout_s: self.timeout,
         }
     }
@@ -265,6 +293,8 @@ pub(crate) fn drive(args: &DriveArgs, console: Console) -> Result<ExitCode, Fail
     let mut end = None;
     let mut guarded_by = None;
     let mut goal = None;
+    let mut hold = None;
+    let mut silent = Vec::new();
     let result = run_job(&Job::Drive(Box::new(args.job())), |message| match message {
         LinkMessage::Ros2(graph) => print_graph(args, &graph, console),
         LinkMessage::Drives(status) => {
@@ -277,6 +307,16 @@ pub(crate) fn drive(args: &DriveArgs, console: Console) -> Result<ExitCode, Fail
                 console.note(format!("Robot {} goes to column {column}, row {row}", args.robot));
             }
             goal = status.goal;
+            let now_holds = status.plan.and_then(|plan| plan.hold);
+            if now_holds != hold {
+                let text = now_holds.as_deref().unwrap_or("goes on by its plan");
+                console.note(format!("Robot {} {text}", args.robot));
+                hold = now_holds;
+            }
+            if status.silent != silent {
+                console.note(silence_note(args.robot, &status.silent));
+                silent = status.silent;
+            }
         }
         LinkMessage::Driven(status) => end = Some(status),
         // `run_job` returns the failure; the others are of runs and fleets.
@@ -298,6 +338,14 @@ fn print_graph(args: &DriveArgs, graph: &RosGraph, console: Console) {
     console.note(lines.join("\n"));
 }
 
+fn silence_note(robot: EntityId, silent: &[EntityId]) -> String {
+    if silent.is_empty() {
+        return format!("Robot {robot} hears all again");
+    }
+    let ids: Vec<String> = silent.iter().map(ToString::to_string).collect();
+    format!("Robot {robot} does not hear anymore: {}", ids.join(", "))
+}
+
 fn print_end(args: &DriveArgs, status: &DriveStatus, console: Console) -> Result<(), Failure> {
     let result = json!({
         "robot": args.robot,
@@ -312,6 +360,18 @@ fn print_end(args: &DriveArgs, status: &DriveStatus, console: Console) -> Result
         "brakes_before_obstacles": status.obstacles,
         "unreadable_messages": status.unreadable,
         "outdated_messages": status.outdated,
+        "beacons": {
+            "sent": status.beacons.sent,
+            "heard": status.beacons.heard,
+            "unreadable": status.beacons.unreadable,
+            "foreign": status.beacons.foreign,
+            "outdated": status.beacons.outdated,
+        },
+        "plan": status.plan.as_ref().map(|plan| json!({
+            "actions": plan.actions,
+            "done": plan.done,
+            "waits": plan.waits,
+        })),
     });
     console.print_result_or_short(&result, &format!("{}\n", status.actions), || {
         let stops = format!(
@@ -327,10 +387,24 @@ fn print_end(args: &DriveArgs, status: &DriveStatus, console: Console) -> Result
             key_value_pair("timeouts", status.timeouts.to_string()),
             key_value_pair("guard", stops),
             key_value_pair("dropped", dropped),
+            key_value_pair("beacons", beacons_text(&status.beacons)),
         ];
+        lines.extend(status.plan.as_ref().map(|plan| key_value_pair("plan", plan_text(plan))));
         let path = |name, path: &PathBuf| key_value_pair(name, path.display().to_string());
         lines.extend(args.out.iter().map(|file| path("motions", file)));
         lines.extend(args.bag.iter().map(|folder| path("bag", folder)));
         format!("Robot {}\n{}", args.robot, align_pairs(&lines))
     })
+}
+
+fn beacons_text(counts: &BeaconCounts) -> String {
+    format!(
+        "{} sent, {} heard; dropped: {} unreadable, {} foreign, {} outdated",
+        counts.sent, counts.heard, counts.unreadable, counts.foreign, counts.outdated
+    )
+}
+
+fn plan_text(plan: &PlanStatus) -> String {
+    let done = plan.done.map_or("an unknown number".into(), |done| done.to_string());
+    format!("{done} of {} actions, {} waits for others", plan.actions, plan.waits)
 }

@@ -2,22 +2,27 @@
 //! done what it was to do.
 //!
 //! ```text
+//! beacon.rs      what robots tell each other
 //! bag.rs         what was heard and commanded, as a bag of ROS 2
 //! motion_log.rs  the table of its motions, from which `sidestep learn effector` learns
 //! ```
 
 pub mod bag;
+pub mod beacon;
 pub mod motion_log;
 
 use crate::plant::{Plant, PlantState};
+use beacon::Beacons;
 use motion_log::MotionLog;
+use sidestep::kernel::EntityId;
 use sidestep::kernel::ports::RecordError;
 use sidestep::worlds::robots::drive::DriveVelocity;
 use sidestep::worlds::robots::drive::controller::DriveState;
 use sidestep::worlds::robots::drive::driver::{DriveStep, Driver};
 use sidestep::worlds::robots::drive::grid::Pose2;
 use sidestep::worlds::robots::drive::guard::{GuardCause, GuardView};
-use sidestep_session::fleet::DriveStatus;
+use sidestep::worlds::robots::drive::plan_executor::{PlanExecutor, PlanHold};
+use sidestep_session::fleet::{DriveStatus, PlanStatus};
 use std::time::{Duration, Instant};
 
 /// The longest wait for a pose: then the process looks whether it has to end, and whether measurements are still fresh.
@@ -46,10 +51,18 @@ pub enum DriveError {
 /// When a drive is done.
 #[derive(Debug, Clone, Copy)]
 pub struct DriveEnd {
-    /// Number of actions.
+    /// Number of actions; one that carries out a plan ends with the plan of all.
     pub actions: u64,
     /// Number of complete trips; none for any.
     pub trips: Option<u64>,
+}
+
+/// What changes with what others tell.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct TeamNews {
+    heard: Vec<EntityId>,
+    silent: Vec<EntityId>,
+    hold: Option<PlanHold>,
 }
 
 /// A drive.
@@ -59,6 +72,9 @@ pub struct Drive<'a, P: Plant> {
     driver: Driver,
     end: DriveEnd,
     log: Option<MotionLog>,
+    beacons: Beacons,
+    /// What was told last of those who are silent, who are heard, and why it stands.
+    team_news: TeamNews,
     /// The time of the last pose that was used, in seconds.
     last_s: Option<f64>,
     status: DriveStatus,
@@ -68,12 +84,20 @@ pub struct Drive<'a, P: Plant> {
 
 impl<'a, P: Plant> Drive<'a, P> {
     /// Returns a drive that has not begun.
-    pub fn new(plant: &'a mut P, driver: Driver, end: DriveEnd, log: Option<MotionLog>) -> Self {
+    pub fn new(
+        plant: &'a mut P,
+        driver: Driver,
+        beacons: Beacons,
+        end: DriveEnd,
+        log: Option<MotionLog>,
+    ) -> Self {
         Self {
             plant,
             driver,
             end,
             log,
+            beacons,
+            team_news: TeamNews::default(),
             last_s: None,
             status: DriveStatus::default(),
             cause: None,
@@ -99,23 +123,79 @@ impl<'a, P: Plant> Drive<'a, P> {
             let state = self.plant.wait(POLL_INTERVAL);
             self.status.unreadable = state.unreadable;
             self.status.outdated = state.outdated;
-            let step = self.step(&state)?;
+            self.hear();
+            let mut is_news = false;
+            if let Some(step) = self.step(&state)? {
+                self.plant.command(step.velocity).map_err(DriveError::Plant)?;
+                is_news |= self.record(&step)? || missing != state.missing;
+                missing.clone_from(&state.missing);
+            }
             // After the step, by which it is known where the robot stands.
-            let has_goal = state.goal.as_ref().is_some_and(|goal| self.take_goal(goal));
-            let Some(step) = step else {
-                if has_goal {
-                    on_status(&self.status(&state));
-                }
-                continue;
-            };
-            self.plant.command(step.velocity).map_err(DriveError::Plant)?;
-            let is_news = self.record(&step)? || has_goal || missing != state.missing;
-            missing.clone_from(&state.missing);
+            is_news |= state.goal.as_ref().is_some_and(|goal| self.take_goal(goal));
+            self.tell()?;
+            is_news |= self.has_team_news();
             if is_news {
                 on_status(&self.status(&state));
             }
         }
         Ok(())
+    }
+
+    /// Takes what other robots tell, and forgets those that are silent.
+    fn hear(&mut self) {
+        let arrived = self.plant.take_beacons();
+        let now = Instant::now();
+        self.beacons.count_overflow(arrived.dropped);
+        for bytes in &arrived.messages {
+            if let Some(beacon) = self.beacons.read(bytes, now) {
+                self.driver.hear(beacon);
+            }
+        }
+        for robot in self.beacons.find_silent(now) {
+            self.driver.forget(robot);
+        }
+    }
+
+    /// Tells the others of this robot, if there is something to tell.
+    fn tell(&mut self) -> Result<(), DriveError> {
+        let Some(beacon) = self.driver.beacon() else { return Ok(()) };
+        let Some(message) = self.beacons.next_message(beacon, Instant::now()) else {
+            return Ok(());
+        };
+        self.plant.tell(&message).map_err(DriveError::Plant)
+    }
+
+    fn has_team_news(&mut self) -> bool {
+        let news = TeamNews {
+            heard: self.driver.heard().to_vec(),
+            silent: self.beacons.silent(),
+            hold: self.driver.hold().cloned(),
+        };
+        let is_news = news != self.team_news;
+        self.team_news = news;
+        is_news
+    }
+
+    fn plan_status(&self, plan: &PlanExecutor) -> PlanStatus {
+        let hold = self.driver.hold();
+        PlanStatus {
+            actions: plan.actions(),
+            done: plan.done(),
+            waits: self.driver.counts().plan_waits,
+            hold: hold.map(|hold| self.hold_text(hold)),
+            waits_for: hold.map_or(Vec::new(), |hold| hold.robots().to_vec()),
+        }
+    }
+
+    /// Returns why it stands, and which of those for whom it waits are silent.
+    fn hold_text(&self, hold: &PlanHold) -> String {
+        let silent = self.beacons.silent();
+        let silent = silent.iter().filter(|robot| hold.robots().contains(robot));
+        let silent: Vec<String> = silent.map(ToString::to_string).collect();
+        if silent.is_empty() {
+            return hold.to_string();
+        }
+        format!("{hold}; silent: {}", silent.join(", "))
     }
 
     /// Returns the state so far.
@@ -141,11 +221,21 @@ impl<'a, P: Plant> Drive<'a, P> {
             old_states: counts.guard.old_states,
             off_map: counts.guard.off_map,
             obstacles: counts.guard.obstacles,
+            beacons: self.beacons.counts(),
+            heard: self.driver.heard().to_vec(),
+            silent: self.beacons.silent(),
+            plan: self.driver.plan().map(|plan| self.plan_status(plan)),
             ..self.status.clone()
         }
     }
 
     fn is_done(&self) -> bool {
+        if let Some(plan) = self.driver.plan() {
+            // Others may still wait to be told of its end, as long as they are there.
+            let silent = self.beacons.silent();
+            let is_told = plan.uninformed().iter().all(|robot| silent.contains(robot));
+            return plan.is_complete_for_all() && is_told;
+        }
         let counts = self.driver.counts();
         let has_all_trips = self.end.trips.is_some_and(|trips| counts.trips >= trips);
         counts.actions >= self.end.actions || has_all_trips

@@ -1,3 +1,4 @@
+use super::beacon::{Beacons, CommonGround};
 use super::motion_log::{MotionLog, MotionNames};
 use super::{Drive, DriveEnd, DriveError};
 use crate::plant::{Measured, Plant, PlantState};
@@ -44,6 +45,11 @@ fn driver() -> Driver {
         patience_s: 0.5,
     };
     Driver::new(&world(), 0, limits, guard).expect("it can drive")
+}
+
+fn beacons() -> Beacons {
+    let common = CommonGround { robots: 1, digest: world().common_digest(None) };
+    Beacons::new(0, common, Duration::from_secs(2))
 }
 
 /// A robot in a corridor that does what it is told, and whose measurements stop to come after a number of poses.
@@ -124,7 +130,7 @@ fn a_drive_ends_after_its_actions_with_a_table_and_a_robot_that_stands() {
     let mut plant = Corridor::new(usize::MAX);
     let end = DriveEnd { actions: 3, trips: None };
     let mut statuses = Vec::new();
-    let mut drive = Drive::new(&mut plant, driver(), end, Some(log));
+    let mut drive = Drive::new(&mut plant, driver(), beacons(), end, Some(log));
     drive.pass(&|| false, &mut |status| statuses.push(status.clone())).expect("it is done");
     assert_eq!(drive.final_status().actions, 3);
     drop(drive);
@@ -149,7 +155,7 @@ fn a_plant_that_falls_silent_is_told_to_stand_and_that_is_counted_once() {
         looks.get() > 60
     };
     let end = DriveEnd { actions: 99, trips: None };
-    let mut drive = Drive::new(&mut plant, driver(), end, None);
+    let mut drive = Drive::new(&mut plant, driver(), beacons(), end, None);
     let passed = drive.pass(&has_to_end, &mut |_| {});
     assert!(matches!(passed, Err(DriveError::Interrupted)));
     assert_eq!(drive.final_status().old_states, 1);

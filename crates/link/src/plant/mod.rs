@@ -14,6 +14,7 @@ pub mod inbox;
 pub mod model;
 pub mod ros2;
 
+use crate::drive::beacon::RobotBeacon;
 use sidestep::worlds::robots::drive::DriveVelocity;
 use sidestep::worlds::robots::drive::grid::Pose2;
 use sidestep::worlds::robots::drive::scan::RangeScan;
@@ -70,4 +71,26 @@ pub trait Plant {
     /// # Errors
     /// When the robot cannot be reached anymore, with the reason.
     fn command(&mut self, velocity: DriveVelocity) -> Result<(), String>;
+
+    /// Returns the beacons of other robots that have come since the last call, as bytes. A robot that has none hears nobody.
+    fn take_beacons(&mut self) -> ArrivedBeacons {
+        ArrivedBeacons::default()
+    }
+
+    /// Tells the other robots of this one. A robot that has none tells nobody.
+    ///
+    /// # Errors
+    /// When the network cannot be reached anymore, with the reason.
+    fn tell(&mut self, _beacon: &RobotBeacon) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// Beacons that have come.
+#[derive(Debug, Default)]
+pub struct ArrivedBeacons {
+    /// Their bytes, in the order in which they came.
+    pub messages: Vec<Vec<u8>>,
+    /// Number of those that were dropped because too many came at once.
+    pub dropped: u64,
 }

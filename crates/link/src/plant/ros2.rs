@@ -1,8 +1,9 @@
 //! A robot that is a node of ROS 2: it is measured and moved by topics.
 
 use super::inbox::{Inbox, PlantFrames};
-use super::{Plant, PlantState};
+use super::{ArrivedBeacons, Plant, PlantState};
 use crate::drive::bag::DriveBag;
+use crate::drive::beacon::RobotBeacon;
 use crate::ros2::node::RosNode;
 use crate::ros2::rmw::QualityOfService;
 use crate::wire::endpoint::WireSetupError;
@@ -30,9 +31,30 @@ struct SharedInbox {
     arrived: Condvar,
     /// What is kept for later, and the reason why it is not anymore.
     bag: Mutex<Option<DriveBag>>,
+    /// Beacons of other robots.
+    beacons: Mutex<ArrivedBeacons>,
 }
 
+/// Most beacons that wait for the program; it takes them many times in a second.
+const MAX_BEACONS: usize = 4096;
+
+/// Most bytes of a beacon: those of a scenario with 10,000 robots.
+const MAX_BEACON_BYTES: usize = 100_000;
+
 impl SharedInbox {
+    fn beacons(&self) -> MutexGuard<'_, ArrivedBeacons> {
+        self.beacons.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn receive_beacon(&self, bytes: &[u8]) {
+        let mut beacons = self.beacons();
+        if beacons.messages.len() >= MAX_BEACONS || bytes.len() > MAX_BEACON_BYTES {
+            beacons.dropped += 1;
+            return;
+        }
+        beacons.messages.push(bytes.to_vec());
+    }
+
     fn lock(&self) -> MutexGuard<'_, Inbox> {
         self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -63,6 +85,8 @@ pub struct PlantOptions {
     pub takes_goals: bool,
     /// Where its messages and commands are recorded.
     pub bag: Option<DriveBag>,
+    /// The full names of the topics on which it hears other robots.
+    pub peers: Vec<String>,
 }
 
 /// A robot by its topics.
@@ -74,6 +98,8 @@ pub struct Ros2Plant {
     topics: DriveTopics,
     /// The full name of the topic of commands.
     cmd_vel: String,
+    /// The full name of the topic of its beacons.
+    beacon: String,
     /// The name under which the poses in the map are recorded.
     pose: String,
     /// The time of the last pose in seconds.
@@ -123,6 +149,7 @@ impl Ros2Plant {
             inbox: Mutex::new(Inbox::new(frames)),
             arrived: Condvar::new(),
             bag: Mutex::new(options.bag),
+            beacons: Mutex::default(),
         });
         let volatile = QualityOfService::DEFAULT;
         let latched = QualityOfService::LATCHED;
@@ -143,9 +170,25 @@ impl Ros2Plant {
                 inbox.receive_goal(bytes)
             })?;
         }
+        for topic in &options.peers {
+            let to = shared.clone();
+            node.subscribe(topic, RobotBeacon::NAME, volatile, move |bytes| {
+                to.receive_beacon(bytes);
+            })?;
+        }
+        let beacon = node.resolve(&topics.beacon);
         let cmd_vel = node.resolve(&topics.cmd_vel);
         let pose = format!("{}/pose", node.full_name());
-        Ok(Self { node, shared, seen: 0, topics: topics.clone(), cmd_vel, pose, time_s: 0.0 })
+        Ok(Self {
+            node,
+            shared,
+            seen: 0,
+            topics: topics.clone(),
+            cmd_vel,
+            beacon,
+            pose,
+            time_s: 0.0,
+        })
     }
 
     /// Leaves the network, and completes the bag.
@@ -217,6 +260,16 @@ impl Plant for Ros2Plant {
             bag.record_message(&message);
         }
         let sent = self.node.publish_as(&self.cmd_vel, &message);
+        sent.map_err(|error| error.to_string())
+    }
+
+    fn take_beacons(&mut self) -> ArrivedBeacons {
+        std::mem::take(&mut *self.shared.beacons())
+    }
+
+    fn tell(&mut self, beacon: &RobotBeacon) -> Result<(), String> {
+        let message = RosMessage::new(self.beacon.clone(), self.time_s, beacon);
+        let sent = self.node.publish_as(&self.beacon, &message);
         sent.map_err(|error| error.to_string())
     }
 }

@@ -4,6 +4,7 @@ use super::output::print_message;
 use super::parent_monitor::ParentMonitor;
 use super::ros2::{network_error, with_ports};
 use crate::drive::bag::DriveBag;
+use crate::drive::beacon::{Beacons, CommonGround};
 use crate::drive::motion_log::{MotionLog, MotionNames};
 use crate::drive::{Drive, DriveEnd, DriveError};
 use crate::plant::Plant;
@@ -16,12 +17,14 @@ use sidestep::worlds::robots::drive::DriveVelocity;
 use sidestep::worlds::robots::drive::controller::DriveLimits;
 use sidestep::worlds::robots::drive::driver::Driver;
 use sidestep::worlds::robots::drive::guard::GuardLimits;
+use sidestep::worlds::robots::drive::plan_executor::PlanExecutor;
 use sidestep::worlds::robots::scenario::Compiled;
 use sidestep::worlds::robots::world::Role;
 use sidestep_session::Error;
 use sidestep_session::fleet::{DriveJob, DriveSettings, LinkMessage, RosNetwork};
 use std::io;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Largest distance from the end of an action, as a share of a box; more would be noticed where two bodies pass.
 const TOLERANCE_BOXES: f64 = 0.06;
@@ -52,21 +55,23 @@ pub(super) fn run(job: &DriveJob, parent: &ParentMonitor) -> Result<(), Error> {
     let world = &building.world;
     let limits = drive_limits(&job.settings, world.map.box_size_m);
     let guard = guard_limits(&job.settings, side_m(world, job.robot));
-    let driver = Driver::new(world, job.robot, limits, guard)
-        .map_err(|(cause, remedy)| InputError::new(&source.place, cause, remedy))?;
+    let driver = Driver::of_scenario(building, &source, job.robot, limits, guard)?;
+    check_end(job, &driver)?;
+    let peers = peer_topics(job, world)?;
+    let beacons = beacons(job, world, &driver);
     let network = RosNetwork { listen: with_ports(&job.network.listen)?, ..job.network.clone() };
     let node = RosNode::open(&network, &format!("sidestep_drive_{}", job.robot));
     let node = node.map_err(network_error)?;
     // After the network: what is wrong there leaves no file behind.
     let log = motion_log(job, world)?;
-    let options = PlantOptions { takes_goals: driver.takes_goals(), bag: drive_bag(job)? };
+    let options = PlantOptions { takes_goals: driver.takes_goals(), bag: drive_bag(job)?, peers };
     let mut plant = Ros2Plant::start(node, &job.topics, options).map_err(network_error)?;
     // So that the topic of commands is known before the first measurement, and a robot that moves stands.
     plant.command(DriveVelocity::ZERO).map_err(|cause| drive_error(DriveError::Plant(cause)))?;
     print_message(&LinkMessage::Listens(network.listen.clone()));
     print_message(&LinkMessage::Ros2(plant.node().graph()));
     let end = DriveEnd { actions: compiled.plan().cycles, trips: job.trips };
-    let mut drive = Drive::new(&mut plant, driver, end, log);
+    let mut drive = Drive::new(&mut plant, driver, beacons, end, log);
     let passed = drive.pass(&|| parent.has_ended(), &mut |status| {
         print_message(&LinkMessage::Drives(status.clone()));
     });
@@ -76,6 +81,63 @@ pub(super) fn run(job: &DriveJob, parent: &ParentMonitor) -> Result<(), Error> {
     let stored = plant.end();
     passed.map_err(drive_error)?;
     stored.map_err(|error| drive_error(DriveError::Bag(error)))
+}
+
+/// Checks that a robot with a plan has no other end: those that wait for it would wait in vain.
+fn check_end(job: &DriveJob, driver: &Driver) -> Result<(), InputError> {
+    if job.trips.is_none() || driver.plan().is_none() {
+        return Ok(());
+    }
+    let cause = "a plan ends when all robots have carried out their parts of it";
+    Err(InputError::new("--trips", cause, "leave it out; fewer cycles make a shorter plan"))
+}
+
+fn beacons(job: &DriveJob, world: &RobotsWorld, driver: &Driver) -> Beacons {
+    let common = CommonGround {
+        robots: world.robot_count() as u32,
+        digest: world.common_digest(driver.plan().map(PlanExecutor::plan)),
+    };
+    let patience = Duration::from_secs_f64(job.settings.beacon_patience_s);
+    Beacons::new(job.robot, common, patience)
+}
+
+/// Returns the topics on which the robot hears the others of its scenario.
+fn peer_topics(job: &DriveJob, world: &RobotsWorld) -> Result<Vec<String>, InputError> {
+    let topic = &job.topics.beacon;
+    let others = (0..world.robot_count() as u32).filter(|&robot| robot != job.robot);
+    if topic.starts_with('/') {
+        // One for all robots.
+        return Ok(vec![topic.clone()]);
+    }
+    let pattern = job.topics.peers.clone();
+    let pattern = pattern.or_else(|| peer_pattern(&job.network.namespace, job.robot));
+    let Some(pattern) = pattern else {
+        let has_others = world.robot_count() > 1;
+        if has_others && world.listens_to_others(job.robot) {
+            let cause = format!(
+                "the namespace {} does not end with the id {} of the robot, so those of the others are not known",
+                job.network.namespace, job.robot
+            );
+            let remedy = "give --peers with {} in place of the id, such as --peers robot_{}";
+            return Err(InputError::new("--namespace", cause, remedy));
+        }
+        if has_others {
+            tracing::warn!("the robot hears no others: give --peers, such as --peers robot_{{}}");
+        }
+        return Ok(Vec::new());
+    };
+    let of_robot = |robot: u32| {
+        let namespace = pattern.replace("{}", &robot.to_string());
+        format!("{}/{topic}", namespace.trim_end_matches('/'))
+    };
+    Ok(others.map(of_robot).collect())
+}
+
+/// Returns a namespace with `{}` in place of the id of its robot, if that is the number at its end.
+fn peer_pattern(namespace: &str, robot: u32) -> Option<String> {
+    let stem = namespace.trim_end_matches(|c: char| c.is_ascii_digit());
+    let is_id = namespace[stem.len()..].parse() == Ok(robot);
+    is_id.then(|| format!("{stem}{{}}"))
 }
 
 fn side_m(world: &RobotsWorld, robot: u32) -> f64 {
@@ -150,4 +212,17 @@ fn drive_error(error: DriveError) -> Error {
         DriveError::Log(_) | DriveError::Bag(_) => "see whether the disk is full",
     };
     Error::other(error.to_string(), remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::peer_pattern;
+
+    #[test]
+    fn namespaces_of_others_are_known_where_the_own_one_ends_with_the_id() {
+        assert_eq!(peer_pattern("/hall/robot_12", 12).as_deref(), Some("/hall/robot_{}"));
+        assert_eq!(peer_pattern("/robot_1", 2), None);
+        assert_eq!(peer_pattern("/kitchen", 2), None);
+        assert_eq!(peer_pattern("/", 0), None);
+    }
 }

@@ -6,6 +6,7 @@
 //! all of them with what these packages compute.
 
 use super::rmw::RosType;
+use crate::drive::beacon::BEACON_TYPE;
 
 /// The types of the messages of runs and of robots that are driven, by name.
 pub const MESSAGE_TYPES: [RosType; 12] = [
@@ -70,5 +71,6 @@ pub const TWIST_NAME: &str = "geometry_msgs/msg/Twist";
 
 /// Returns the type of messages with a name.
 pub fn message_type(name: &str) -> Option<RosType> {
-    MESSAGE_TYPES.into_iter().find(|known| known.name == name)
+    let mut types = MESSAGE_TYPES.into_iter().chain([BEACON_TYPE]);
+    types.find(|known| known.name == name)
 }

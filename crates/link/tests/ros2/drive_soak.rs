@@ -19,8 +19,8 @@ const WAYS: [([u32; 3], [u32; 2]); 4] =
 /// Longest time without a new action: a stop, a start, and others that stand in the way.
 const MAX_ABSENCE: Duration = Duration::from_secs(120);
 
-/// Seconds after which a base without commands stands.
-const BASE_TIMEOUT_S: f64 = 0.5;
+/// Steps of a twentieth of a second after which a base without commands stands.
+const BASE_TIMEOUT_STEPS: u32 = 10;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fault {
@@ -122,7 +122,7 @@ fn robots_whose_programs_are_killed_stopped_and_interrupted_go_on_and_touch_noth
     let folder = ScenarioFolder::new(&scenario(2 + lasts.as_secs() as usize / 10));
     let file = folder.path("s.toml");
     let starts = WAYS.map(|(start, _)| start);
-    let mut plants = Plants::start_with(&starts, json!({ "timeout": BASE_TIMEOUT_S }));
+    let mut plants = Plants::start_with(&starts, json!({ "stop_after": BASE_TIMEOUT_STEPS }));
     let port = plants.port;
     let mut drivers: Vec<Driver> =
         (0..WAYS.len()).map(|robot| Driver::start(&file, robot, port)).collect();

@@ -8,6 +8,7 @@ mod closed_loop;
 mod drive;
 mod drive_soak;
 mod process;
+mod team;
 
 use process::{Peer, RosProcess, job};
 use serde_json::{Value, json};

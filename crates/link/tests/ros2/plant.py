@@ -7,8 +7,8 @@ CONFIG is a JSON object: `port`, at which the router listens; `domain`; `map`, r
 `starts`, a column, a row and a heading in degrees for each robot; `radius_m`; `walls`, further squares that the map of the
 robots does not have, by column and row; `stamped`, whether commands are TwistStamped; `rays` of a laser; `drift_m`, the standard
 deviation of what localization is off, which changes within a quarter of a minute; `pace`, seconds of the robots in a second at most;
-`goals`, whether goals can be sent; `timeout`, seconds after the last command after which a robot stands, as drivers of bases
-have it. Wheels slip, lasers and localization are noisy. Lines on standard input:
+`goals`, whether goals can be sent; `beacon`, the definition of RobotBeacon, whose topics are heard; `stop_after`, steps without a
+command after which a base stops. Wheels slip, lasers and localization are noisy. Lines on standard input:
 
     silence   stop sending measurements; answers when the last command of each robot is zero
     speak     send them again
@@ -26,7 +26,7 @@ import time
 
 import numpy as np
 import zenoh
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zenoh_ros2_sdk import ROS2Publisher, ROS2Subscriber, ZenohSession
 
 CONFIG = json.loads(sys.argv[1])
@@ -42,13 +42,16 @@ DRIFT_S = 15.0
 MAX_RANGE_M = 8.0
 # Of the scanner on its robot.
 MOUNT_M = 0.05
-TIMEOUT_S = CONFIG.get("timeout", math.inf)
 # The longest wait for a command.
 MAX_WAIT_S = 1.0
 # Longer than anything here takes, on a machine that has much else to do.
 DEADLINE_S = 120.0
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
+BEACON = "sidestep_msgs/msg/RobotBeacon"
+if "beacon" in CONFIG:
+    TYPES.register(get_types_from_msg(CONFIG["beacon"], BEACON))
+STOP_AFTER = CONFIG.get("stop_after")
 RANDOM = np.random.default_rng(7)
 
 
@@ -88,7 +91,6 @@ class Robot:
         self.yaw = math.radians(degrees)
         self.start = (*self.at, self.yaw)
         self.velocity = (0.0, 0.0)
-        self.commanded_at = time.monotonic()
         self.timeouts = 0
         self.commands = 0
         self.commands_before = 0
@@ -97,6 +99,10 @@ class Robot:
         self.is_touching = False
         self.drift = np.zeros(2)
         self.track = []
+        self.steps_alone = 0
+        self.beacon = None
+        if "beacon" in CONFIG:
+            self.told = topic(ROS2Subscriber, f"/{self.name}/beacon", BEACON, self.on_beacon)
         self.odom = topic(ROS2Publisher, f"/{self.name}/odom", "nav_msgs/msg/Odometry")
         self.scan = topic(ROS2Publisher, f"/{self.name}/scan", "sensor_msgs/msg/LaserScan")
         self.bumper = topic(ROS2Publisher, f"/{self.name}/bumper", "std_msgs/msg/Bool")
@@ -105,10 +111,18 @@ class Robot:
             self.goal = topic(ROS2Publisher, f"/{self.name}/goal_pose", "geometry_msgs/msg/PoseStamped")
         self.heard = topic(ROS2Subscriber, f"/{self.name}/cmd_vel", f"geometry_msgs/msg/{kind}", self.on_command)
 
+    def on_beacon(self, message):
+        self.beacon = {
+            "robot": int(message.robot),
+            "at": [int(message.column), int(message.row), int(message.heading)],
+            "has_word": bool(message.has_word),
+            "done": int(message.done) if message.has_done else None,
+            "digest": bytes(bytearray(message.digest)).hex(),
+        }
+
     def on_command(self, message):
         message = getattr(message, "twist", message)
         self.velocity = (message.linear.x, message.angular.z)
-        self.commanded_at = time.monotonic()
         self.fastest = [max(a, abs(b)) for a, b in zip(self.fastest, self.velocity, strict=True)]
         self.commands += 1
 
@@ -116,10 +130,11 @@ class Robot:
         return self.velocity == (0.0, 0.0) or self.commands > self.commands_before
 
     def advance(self, others):
-        self.commands_before = self.commands
-        if self.velocity != (0.0, 0.0) and time.monotonic() - self.commanded_at > TIMEOUT_S:
+        self.steps_alone = 0 if self.commands > self.commands_before else self.steps_alone + 1
+        if STOP_AFTER and self.steps_alone > STOP_AFTER and self.velocity != (0.0, 0.0):
             self.velocity = (0.0, 0.0)
             self.timeouts += 1
+        self.commands_before = self.commands
         speed, rate = self.velocity
         slip = 1.0 - RANDOM.uniform(0.0, 0.2, 2)
         self.yaw += rate * slip[1] * STEP_S
@@ -303,6 +318,7 @@ class Plant:
                 "fastest": robot.fastest,
                 "commands": robot.commands,
                 "timeouts": robot.timeouts,
+                "beacon": robot.beacon,
             }
             for robot in self.robots
         ]

@@ -20,6 +20,7 @@ mod wander;
 pub use announce::Announce;
 pub use errands::Errands;
 pub use external::External;
+pub(crate) use goto::order_action;
 pub use goto::{Avoidance, Goto, Shuttle};
 pub use plan::Planner;
 pub use replay::Replay;

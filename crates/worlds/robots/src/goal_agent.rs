@@ -4,6 +4,7 @@
 //! What it decides is an action, which the caller orders. So a run holds only orders, and replays without the goals.
 
 use super::agents::{RobotAgent, RobotControl, RobotPercept};
+use super::decide::pass_request::HEARD_REQUEST_WORD;
 use super::decide::{Avoidance, Goto, TripEvent};
 use super::drive::grid::{BodyGrid, Pose2};
 use super::effector::{ActionId, LEFT, RIGHT, STAY};
@@ -114,6 +115,11 @@ impl GoalAgent {
     /// Forgets its goal.
     pub fn clear_goal(&mut self) {
         self.goal = None;
+    }
+
+    /// Takes the request of another robot to make room, as a word of its memory; 0 for none.
+    pub(crate) fn hear_request(&mut self, word: u32) {
+        self.memory[HEARD_REQUEST_WORD] = word;
     }
 
     /// Decides by a percept, of which the memory does not count. Without a goal it stays. A trip begins with the first

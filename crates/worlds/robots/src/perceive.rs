@@ -296,10 +296,7 @@ impl<T: OccupantWord> CycleContext<'_, T> {
     }
 
     fn in_radio_range(&self, radio: &Radio, a: EntitySlot, b: EntitySlot) -> bool {
-        let (a_x, a_y) = self.center_half_boxes(a);
-        let (b_x, b_y) = self.center_half_boxes(b);
-        let (dx, dy) = (a_x - b_x, a_y - b_y);
-        ((dx * dx + dy * dy) as u64) <= radio.reach2_half_boxes
+        radio.reaches(self.center_half_boxes(a), self.center_half_boxes(b))
     }
 
     /// Returns the center of a body in halves of a box, which are whole numbers for every size.

@@ -315,7 +315,8 @@ pub(crate) fn action_of_order(number: u8) -> Action {
     planned_action(number).unwrap_or(Action::Wait)
 }
 
-fn action_id(action: Action) -> decide::ActionId {
+/// Returns the number that an action of a planner has among those of a robot.
+pub(crate) fn action_id(action: Action) -> decide::ActionId {
     match action {
         Action::Forward => FORWARD,
         Action::TurnLeft => LEFT,

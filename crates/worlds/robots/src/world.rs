@@ -444,6 +444,15 @@ impl Radio {
     }
 }
 
+impl Radio {
+    /// Returns whether two bodies hear each other, by their centers in halves of a box.
+    pub(crate) fn reaches(&self, a: (i64, i64), b: (i64, i64)) -> bool {
+        let dx = a.0 - b.0;
+        let dy = a.1 - b.1;
+        ((dx * dx + dy * dy) as u64) <= self.reach2_half_boxes
+    }
+}
+
 impl RobotsWorld {
     /// Returns the type of a body; `id` is an index into [`Self::bodies`].
     pub fn type_of(&self, id: EntityId) -> &BodyType {

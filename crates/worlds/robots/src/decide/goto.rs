@@ -35,6 +35,11 @@ pub(super) fn take_order(memory: &mut Memory) -> ActionId {
     }
 }
 
+/// Writes the next action of a robot that a planner leads into the words of its memory.
+pub(crate) fn order_action(words: &mut [u32; 4], action: ActionId) {
+    words[ORDER_WORD] = u32::from(action) + 1;
+}
+
 impl Avoidance {
     /// Writes the next action of a robot that a planner leads into its memory. It stands until the robot's next turn.
     pub(crate) fn order(memory: &[AtomicCell<u32>; 4], action: ActionId) {

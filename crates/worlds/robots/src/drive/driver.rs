@@ -1,18 +1,27 @@
 //! A robot that its program drives: measurements in, velocities out.
 
 use super::DriveVelocity;
+use super::beacon::DriveBeacon;
 use super::controller::{ActionOutcome, ActionProgress, Controller, DriveLimits, DriveState};
 use super::grid::{BodyGrid, GridLocalizer, Pose2};
 use super::guard::{Guard, GuardCause, GuardCounts, GuardLimits, GuardView};
+use super::neighbors::Neighbors;
 use super::percept::{PerceptBuilder, RobotSituation};
 use super::plan::{ActionPlanner, GridMotion};
+use super::plan_executor::{PlanExecutor, PlanHold, PlanOrder};
 use super::scan::RangeScan;
+use super::team_plan::TeamPlan;
 use crate::agents::{RobotAgent, RobotControl, RobotPercept};
-use crate::decide::{ActionId, Contact, TripEvent};
+use crate::decide::pass_request::{HEARD_REQUEST_WORD, OWN_REQUEST_WORD, own_request};
+use crate::decide::{ActionId, Contact, TripEvent, order_action};
+use crate::effector::STAY;
 use crate::goal_agent::{GoalAgent, GoalRefusal};
+use crate::plan::{action_id, place_in_team};
+use crate::scenario::Compiled;
 use crate::world::RobotsWorld;
-use sidestep_kernel::{Cycle, EntityId};
+use sidestep_kernel::{Cycle, EntityId, InputError};
 use sidestep_planners::GridPose;
+use sidestep_scenario::Source;
 use std::fmt;
 use std::sync::Arc;
 
@@ -46,6 +55,8 @@ pub struct DriveCounts {
     pub timeouts: u64,
     /// Trips that are complete.
     pub trips: u64,
+    /// Times that it began to wait until others have done an action of a plan.
+    pub plan_waits: u64,
     /// How often the guard has stepped in.
     pub guard: GuardCounts,
 }
@@ -72,10 +83,14 @@ impl DriveProgram {
         matches!(self, Self::Goals(agent) if agent.goal().is_none())
     }
 
+    /// Decides by a percept, the memory of which has the request to make room that is heard.
     fn decide(&mut self, percept: &RobotPercept) -> Result<RobotControl, String> {
         match self {
             Self::Own(agent) => agent.decide(percept),
-            Self::Goals(agent) => agent.decide(percept),
+            Self::Goals(agent) => {
+                agent.hear_request(percept.memory[HEARD_REQUEST_WORD]);
+                agent.decide(percept)
+            }
         }
     }
 }
@@ -118,6 +133,27 @@ pub struct Driver {
     contact: Option<Contact>,
     memory: [u32; 4],
     counts: DriveCounts,
+    neighbors: Neighbors,
+    /// Its last word to others.
+    word: Option<u64>,
+    /// The robots whose words were a part of its last percept.
+    heard: Vec<EntityId>,
+    /// Its part in a plan; none where it decides by itself.
+    executor: Option<PlanExecutor>,
+    /// Why it stands instead of doing its next action of the plan.
+    hold: Option<PlanHold>,
+    /// Whether it has decided at the end of its plan, where it may have completed a trip.
+    has_closed: bool,
+}
+
+/// What comes between two actions.
+enum Turn {
+    /// Its program decides for an action.
+    Act,
+    /// Its program decides once more at the end of the plan, where nothing is left to do.
+    Close,
+    /// It stands, and decides nothing.
+    Stand,
 }
 
 #[derive(Debug)]
@@ -148,12 +184,52 @@ impl Driver {
         limits: DriveLimits,
         guard: GuardLimits,
     ) -> Result<Self, (String, String)> {
+        if place_in_team(world, id).is_some() {
+            let cause = format!("robot {id} does what the planner of its team says");
+            return Err((
+                cause,
+                "remove `planner`, or drive it by the plan of its scenario".into(),
+            ));
+        }
+        Self::with_program(world, id, limits, guard)
+    }
+
+    /// Returns the driver of a robot of a scenario. Where planners lead the robots, it carries out its part of the plan of a
+    /// run without errors, which each driver computes for itself.
+    ///
+    /// # Errors
+    /// When a real robot cannot be driven so, or there is no plan without a ring.
+    pub fn of_scenario(
+        compiled: &Compiled,
+        source: &Source,
+        id: EntityId,
+        limits: DriveLimits,
+        guard: GuardLimits,
+    ) -> Result<Self, InputError> {
+        let world = &compiled.world;
+        let refused =
+            |(cause, remedy): (String, String)| InputError::new(&source.place, cause, remedy);
+        // A robot that is not there is in no team, and is refused there.
+        if place_in_team(world, id).is_none() {
+            return Self::new(world, id, limits, guard).map_err(refused);
+        }
+        let plan = TeamPlan::new(compiled, source)?;
+        let mut driver = Self::with_program(world, id, limits, guard).map_err(refused)?;
+        driver.executor = Some(PlanExecutor::new(Arc::new(plan), id));
+        Ok(driver)
+    }
+
+    fn with_program(
+        world: &Arc<RobotsWorld>,
+        id: EntityId,
+        limits: DriveLimits,
+        guard: GuardLimits,
+    ) -> Result<Self, (String, String)> {
         let Some(grid) = BodyGrid::new(world, id) else {
             let cause = format!("there is no robot {id}");
             let last = world.robot_count().saturating_sub(1);
             return Err((cause, format!("give one of 0 to {last}")));
         };
-        check_is_alone(world, id)?;
         let no_program = || {
             let cause = format!("robot {id} has no program");
             (
@@ -181,7 +257,56 @@ impl Driver {
             contact: None,
             memory: [0; 4],
             counts: DriveCounts::default(),
+            neighbors: Neighbors::new(world.clone(), id),
+            word: None,
+            heard: Vec::new(),
+            executor: None,
+            hold: None,
+            has_closed: false,
         })
+    }
+
+    /// Takes what another robot tells of itself, in place of what it told before.
+    pub fn hear(&mut self, beacon: DriveBeacon) {
+        if let Some(executor) = &mut self.executor {
+            executor.hear(&beacon);
+        }
+        self.neighbors.hear(beacon);
+    }
+
+    /// Forgets the place and the words of a robot that is silent. What it has done of a plan stays done.
+    pub fn forget(&mut self, robot: EntityId) {
+        self.neighbors.forget(robot);
+    }
+
+    /// Returns what this robot tells others; nothing as long as its place is not known.
+    pub fn beacon(&self) -> Option<DriveBeacon> {
+        let at = self.localizer.present()?;
+        let request = own_request(self.memory[OWN_REQUEST_WORD]).map_or(0, |request| request.1);
+        let plan = self.executor.as_ref();
+        Some(DriveBeacon {
+            robot: self.neighbors.own(),
+            at,
+            word: self.word,
+            request: if self.neighbors.has_requests() { request } else { 0 },
+            done: plan.and_then(PlanExecutor::done),
+            heard_done: plan.map_or(Vec::new(), PlanExecutor::heard_done),
+        })
+    }
+
+    /// Returns the robots whose words were a part of its last percept.
+    pub fn heard(&self) -> &[EntityId] {
+        &self.heard
+    }
+
+    /// Returns its part in a plan; none where it decides by itself.
+    pub fn plan(&self) -> Option<&PlanExecutor> {
+        self.executor.as_ref()
+    }
+
+    /// Returns why it stands instead of doing its next action of a plan.
+    pub fn hold(&self) -> Option<&PlanHold> {
+        self.hold.as_ref()
     }
 
     /// Returns the percepts' builder, which knows the beams of the scenario.
@@ -240,9 +365,42 @@ impl Driver {
             }
         }
         if !self.program.is_idle() {
-            self.begin_action(state, scan, at)?;
+            match self.turn(at) {
+                Turn::Stand => {}
+                Turn::Close => {
+                    self.decide(state, scan, at)?;
+                }
+                Turn::Act => self.begin_action(state, scan, at)?,
+            }
         }
         Ok(self.guarded(DriveVelocity::ZERO, ended, &view))
+    }
+
+    /// Returns whether it decides now. Under a plan it does when the plan has an action for it, which is then in its memory,
+    /// as planners of a run leave it there.
+    fn turn(&mut self, at: GridPose) -> Turn {
+        let Some(executor) = &mut self.executor else { return Turn::Act };
+        let order = executor.next_order(at);
+        let was_waiting = matches!(self.hold, Some(PlanHold::Others(_)));
+        self.hold = None;
+        match order {
+            PlanOrder::Act(action) => {
+                order_action(&mut self.memory, action_id(action));
+                Turn::Act
+            }
+            PlanOrder::Complete if self.has_closed => Turn::Stand,
+            PlanOrder::Complete => {
+                order_action(&mut self.memory, STAY);
+                self.has_closed = true;
+                Turn::Close
+            }
+            PlanOrder::Hold(hold) => {
+                let is_wait = matches!(hold, PlanHold::Others(_));
+                self.counts.plan_waits += u64::from(is_wait && !was_waiting);
+                self.hold = Some(hold);
+                Turn::Stand
+            }
+        }
     }
 
     /// Returns whether measurements of an age in seconds are fresh enough to move by.
@@ -284,12 +442,17 @@ impl Driver {
         Some(driven)
     }
 
-    fn begin_action(
+    /// Returns the action for which the program decides.
+    fn decide(
         &mut self,
         state: &DriveState,
         scan: &RangeScan,
         at: GridPose,
-    ) -> Result<(), String> {
+    ) -> Result<ActionId, String> {
+        if self.neighbors.has_requests() {
+            // Of what it has heard before it has taken notice.
+            self.memory[HEARD_REQUEST_WORD] = self.neighbors.request_to(at);
+        }
         let situation = RobotSituation {
             cycle: self.cycle,
             at,
@@ -297,28 +460,27 @@ impl Driver {
             contact: self.contact,
             memory: self.memory,
         };
-        let control = self.program.decide(&self.percepts.percept(&situation, scan))?;
+        let heard = self.neighbors.words_heard(at);
+        self.heard = heard.iter().map(|message| message.sender).collect();
+        let percept = RobotPercept { heard, ..self.percepts.percept(&situation, scan) };
+        let control = self.program.decide(&percept)?;
         self.memory = control.memory;
+        // The last word stays until there is another one, as in a run.
+        self.word = control.broadcast.or(self.word);
         self.counts.trips += u64::from(control.trip == Some(TripEvent::Completed));
-        let plan = self.planner.plan(control.action, at);
+        Ok(control.action)
+    }
+
+    fn begin_action(
+        &mut self,
+        state: &DriveState,
+        scan: &RangeScan,
+        at: GridPose,
+    ) -> Result<(), String> {
+        let action = self.decide(state, scan, at)?;
+        let plan = self.planner.plan(action, at);
         let controller = Controller::start(self.limits, &self.grid, plan, state, self.robot_kind);
-        self.present = Some(PresentAction { action: control.action, controller });
+        self.present = Some(PresentAction { action, controller });
         Ok(())
     }
-}
-
-/// Refuses robots that act by what others say: nothing brings that to a real robot.
-fn check_is_alone(world: &RobotsWorld, id: EntityId) -> Result<(), (String, String)> {
-    if world.radio.is_some() {
-        let cause =
-            "the robots of the scenario talk by radio, and a robot that is driven hears nobody";
-        let remedy = "remove [radio], and give the robots a behavior that needs none";
-        return Err((cause.into(), remedy.into()));
-    }
-    if world.planner_teams.iter().any(|team| team.robots.contains(&id)) {
-        let cause = format!("robot {id} does what the planner of its team says, and is not alone");
-        let remedy = "remove `planner` from its section, or run it in a fleet: sidestep fleet";
-        return Err((cause, remedy.into()));
-    }
-    Ok(())
 }

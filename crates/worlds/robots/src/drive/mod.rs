@@ -11,16 +11,24 @@
 //! plan.rs        where an action is meant to end
 //! controller.rs  velocities that lead there: turn, go, stop; and contacts on the way
 //! guard.rs       limits that hold whatever the program decides
+//! beacon.rs      what a robot tells the others
+//! neighbors.rs   words and requests that it hears of them
+//! team_plan.rs   the plan of all robots, which each computes for itself
+//! plan_executor.rs  its own part of that plan, in the order of all
 //! driver.rs      all of it together: measurements in, velocities out
 //! ```
 
+pub mod beacon;
 pub mod controller;
 pub mod driver;
 pub mod grid;
 pub mod guard;
+pub mod neighbors;
 pub mod percept;
 pub mod plan;
+pub mod plan_executor;
 pub mod scan;
+pub mod team_plan;
 #[cfg(test)]
 mod tests;
 

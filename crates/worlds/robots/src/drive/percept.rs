@@ -97,7 +97,7 @@ impl PerceptBuilder {
         beams.filter(|beam| !scan.looks_toward(beam.bearing_rad)).count()
     }
 
-    /// Returns the percept of a robot; it hears nobody.
+    /// Returns the percept of a robot without what it hears of others.
     pub fn percept(&self, situation: &RobotSituation, scan: &RangeScan) -> RobotPercept {
         let mut readings = Vec::new();
         for sensor in &self.sensors {

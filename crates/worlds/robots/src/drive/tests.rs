@@ -1,12 +1,16 @@
 use super::DriveVelocity;
+use super::beacon::DriveBeacon;
 use super::controller::{DriveLimits, DriveState};
 use super::driver::{DriveGoalRefusal, DrivenAction, Driver};
 use super::grid::{BodyGrid, GridLocalizer, Pose2};
 use super::guard::{Guard, GuardCause, GuardLimits, GuardView};
+use super::neighbors::Neighbors;
 use super::percept::{PerceptBuilder, RobotSituation};
+use super::plan_executor::PlanExecutor;
 use super::scan::RangeScan;
 use crate::agents::RobotPercept;
 use crate::effector::FORWARD;
+use crate::scenario::{Behaviours, Compiled, StorageOrder};
 use crate::world::RobotsWorld;
 use crate::{RobotsRun, robots_run};
 use sidestep_kernel::Simulation;
@@ -466,7 +470,7 @@ fn the_guard_stops_without_fresh_measurements_and_off_the_map_and_bounds_speeds(
 }
 
 #[test]
-fn robots_that_are_not_alone_or_go_sideways_are_refused() {
+fn robots_that_are_not_there_are_led_or_go_sideways_are_refused() {
     let refused = |text: &str, id| {
         let (cause, remedy) =
             Driver::new(&world(text), id, LIMITS, GUARD).expect_err("it is refused");
@@ -475,8 +479,6 @@ fn robots_that_are_not_alone_or_go_sideways_are_refused() {
     };
     let one = "[[robots]]\nat = [[3, 8, 1]]\n";
     assert!(refused(&scenario(one), 7).contains("no robot 7"));
-    let talking = scenario("[radio]\nrange_m = 2\n[[robots]]\nat = [[3, 8, 1]]\n");
-    assert!(refused(&talking, 0).contains("radio"));
     let led = scenario(
         "[[robots]]\nat = [[3, 8, 1]]\nbehaviour = { kind = \"goto\", goals = [[0, 0]] }\n\
          planner = { method = \"pibt\" }\n",
@@ -518,4 +520,129 @@ fn a_robot_under_orders_is_driven_to_goals_from_outside_and_stands_without_one()
         Driver::new(&self::world(&scenario("[[robots]]\nat = [[2, 1, 0]]\n")), 0, LIMITS, GUARD);
     let own = own.expect("it can drive").set_goal(&goal);
     assert_eq!(own, Err(DriveGoalRefusal::OwnProgram));
+}
+
+const RADIO: &str = "[radio]\nrange_m = 2.0\n[[robots]]\nat = [[0, 0, 0], [3, 0, 2], [9, 0, 2]]\n\
+    sensors = [\"sonar-8\"]\neffector = \"nomad\"\nbehaviour = { kind = \"announce\" }\n";
+
+#[test]
+fn words_are_heard_as_in_a_run_by_those_in_range_until_a_robot_is_silent() {
+    let mut run = run(&scenario(RADIO));
+    run.advance(1);
+    let world = run.world().clone();
+    let percepts = world.percepts_in_cycle(run.state(), 1);
+    let mut neighbors: Vec<Neighbors> =
+        (0..3).map(|id| Neighbors::new(world.clone(), id)).collect();
+    let snapshot = run.state().snapshot(&world, 1);
+    for percept in &percepts {
+        let at = GridPose { col: percept.at.0, row: percept.at.1, heading: percept.heading };
+        let word = snapshot.bodies[percept.id as usize].voice;
+        assert!(word.is_some());
+        let beacon = beacon(percept.id, at, word);
+        neighbors.iter_mut().for_each(|one| one.hear(beacon.clone()));
+    }
+    for percept in &percepts {
+        let at = GridPose { col: percept.at.0, row: percept.at.1, heading: percept.heading };
+        assert_eq!(neighbors[percept.id as usize].words_heard(at), percept.heard);
+    }
+    assert_eq!(percepts[0].heard.len(), 1, "the third one is too far");
+    neighbors[0].forget(1);
+    let at = GridPose { col: 0, row: 0, heading: 0 };
+    assert_eq!(neighbors[0].words_heard(at), []);
+    neighbors[0].hear(beacon(77, at, Some(1)));
+    neighbors[0].hear(beacon(1, GridPose { col: 20, ..at }, Some(1)));
+    assert_eq!(neighbors[0].words_heard(at), [], "there is no such robot, and no such box");
+}
+
+fn beacon(robot: u32, at: GridPose, word: Option<u64>) -> DriveBeacon {
+    DriveBeacon { robot, at, word, request: 0, done: None, heard_done: Vec::new() }
+}
+
+#[test]
+fn a_request_is_heard_by_the_first_robot_in_its_direction_only() {
+    let world = world(&scenario(
+        "[[robots]]\nat = [[0, 0, 0], [2, 0, 2], [1, 5, 2]]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
+         behaviour = { kind = \"goto\", goals = [[5, 0]], avoidance = \"plan\" }\n",
+    ));
+    // Of rank 1 to the east, and no further direction.
+    let east = 1 << 5 | 4 << 2;
+    let asks = |col: u32| DriveBeacon {
+        request: east,
+        ..beacon(0, GridPose { col, row: 0, heading: 0 }, None)
+    };
+    let at = GridPose { col: 2, row: 0, heading: 2 };
+    let mut neighbors = Neighbors::new(world, 1);
+    assert!(neighbors.has_requests());
+    neighbors.hear(asks(0));
+    assert_eq!(neighbors.request_to(at), east);
+    assert_eq!(neighbors.request_to(GridPose { row: 1, ..at }), 0, "not on its way");
+    assert_eq!(neighbors.request_to(GridPose { col: 3, ..at }), 0, "too far");
+    neighbors.hear(beacon(2, GridPose { col: 1, row: 0, heading: 0 }, None));
+    assert_eq!(neighbors.request_to(at), 0, "another one is between them");
+    neighbors.forget(2);
+    neighbors.forget(0);
+    assert_eq!(neighbors.request_to(at), 0);
+}
+
+/// Robots that change sides through a door of one box.
+fn door() -> String {
+    let mut text = "format = 1\nworld = \"robots\"\ncycles = 200\nregime = \"reliable\"\n[map]\nbox_size_m = 0.5\n\
+        ascii = \"\"\"\n....#....\n.........\n....#....\n\"\"\"\n"
+        .to_string();
+    let robots =
+        [([0, 1, 0], [8, 0]), ([0, 2, 0], [8, 2]), ([8, 0, 2], [0, 1]), ([8, 2, 2], [0, 2])];
+    // One planner leads all: those of a team of its own would take the others for walls.
+    let mut leader = "name = \"all\"\nplanner = { method = \"lacam\" }";
+    for (start, goal) in robots {
+        text += &format!(
+            "[[robots]]\nat = [{start:?}]\nsensors = [\"sonar-8\"]\neffector = \"nomad\"\n\
+             behaviour = {{ kind = \"goto\", goals = [{goal:?}] }}\n{leader}\n"
+        );
+        leader = "team = \"all\"";
+    }
+    text
+}
+
+#[test]
+fn robots_with_a_plan_pass_a_door_in_its_order_and_touch_nobody() {
+    let text = door();
+    let source = Source::new("s.toml", &text, "");
+    let compiled = Compiled::new(&source, &Behaviours::new(), StorageOrder::Spatial);
+    let compiled = compiled.expect("a scenario");
+    let drivers: Vec<(Driver, Pose2)> = (0..4)
+        .map(|id| {
+            let driver = Driver::of_scenario(&compiled, &source, id, LIMITS, GUARD);
+            let driver = driver.expect("it can drive");
+            let ((col, row), heading) = compiled.start[id as usize];
+            let grid = BodyGrid::new(&compiled.world, id).expect("a robot");
+            (driver, grid.center(GridPose { col, row, heading }))
+        })
+        .collect();
+    let digests = drivers.iter().map(|(driver, _)| {
+        compiled.world.common_digest(driver.plan().map(PlanExecutor::plan)).to_string()
+    });
+    let digests: Vec<String> = digests.collect();
+    assert!(digests.iter().all(|digest| *digest == digests[0]));
+    assert_ne!(compiled.world.common_digest(None).to_string(), digests[0]);
+    let mut floor = Floor::of_plants(&compiled.world, drivers);
+    let mut steps = 0;
+    let is_complete =
+        |plant: &Plant| plant.driver.plan().is_some_and(PlanExecutor::is_complete_for_all);
+    while !floor.plants.iter().all(is_complete) {
+        floor.advance(1);
+        let beacons: Vec<DriveBeacon> =
+            floor.plants.iter().filter_map(|plant| plant.driver.beacon()).collect();
+        for (own, plant) in floor.plants.iter_mut().enumerate() {
+            let others = beacons.iter().filter(|beacon| beacon.robot as usize != own);
+            others.for_each(|beacon| plant.driver.hear(beacon.clone()));
+        }
+        steps += 1;
+        assert!(steps < 12_000, "10 minutes");
+    }
+    floor.advance(1);
+    assert_eq!(floor.touches, 0);
+    let waits: u64 = floor.plants.iter().map(|plant| plant.driver.counts().plan_waits).sum();
+    assert!(waits > 0, "they cannot all be first");
+    let trips: u64 = floor.plants.iter().map(|plant| plant.driver.counts().trips).sum();
+    assert_eq!(trips, 4, "all arrive");
 }
