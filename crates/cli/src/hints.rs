@@ -84,6 +84,8 @@ fn words(command: &str) -> Vec<String> {
         words.push(match word {
             "{}" if words.last().is_some_and(|last| last == "new") => "robots".to_string(),
             "N" | "B" | "{}" => "1".to_string(),
+            // What a shell would not fill in is meant so.
+            _ if word.starts_with('\'') && word.contains("{}") => word.replace('\'', ""),
             _ if word.contains('{') && !name.is_empty() => name.to_string(),
             _ => word.replace(['\'', '"'], ""),
         });

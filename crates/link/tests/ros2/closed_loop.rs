@@ -370,8 +370,9 @@ fn close_loop(size: &LoopSize) {
     println!("laser of the plants: sigma {LASER_SD_M} m, without what their localization is off");
     assert!(missed.is_empty(), "{missed:?}");
     let is_predicted = |driven: f64, [_, low, high]: [f64; 3]| {
-        // A little beyond the spread of seeds: the plants are never the same twice.
-        (0.95 * low..=1.05 * high).contains(&driven)
+        // A drive is one draw: 95 of 100 seeds are within, and a busy machine changes who meets whom. So it is more, and a model
+        // that is wrong by a fifth still fails.
+        (0.85 * low..=1.15 * high).contains(&driven)
     };
     assert!(
         is_predicted(driven_actions as f64, actions_by_model),

@@ -136,6 +136,8 @@ pub struct Driver {
     neighbors: Neighbors,
     /// Its last word to others.
     word: Option<u64>,
+    /// Where it has decided last.
+    decided_at: Option<GridPose>,
     /// The robots whose words were a part of its last percept.
     heard: Vec<EntityId>,
     /// Its part in a plan; none where it decides by itself.
@@ -259,6 +261,7 @@ impl Driver {
             counts: DriveCounts::default(),
             neighbors: Neighbors::new(world.clone(), id),
             word: None,
+            decided_at: None,
             heard: Vec::new(),
             executor: None,
             hold: None,
@@ -283,12 +286,14 @@ impl Driver {
     pub fn beacon(&self) -> Option<DriveBeacon> {
         let at = self.localizer.present()?;
         let request = own_request(self.memory[OWN_REQUEST_WORD]).map_or(0, |request| request.1);
+        // A request is for what is before the place where it was made; from the next box it would reach farther.
+        let is_there = self.decided_at.is_some_and(|asked| asked.position() == at.position());
         let plan = self.executor.as_ref();
         Some(DriveBeacon {
             robot: self.neighbors.own(),
             at,
             word: self.word,
-            request: if self.neighbors.has_requests() { request } else { 0 },
+            request: if self.neighbors.has_requests() && is_there { request } else { 0 },
             done: plan.and_then(PlanExecutor::done),
             heard_done: plan.map_or(Vec::new(), PlanExecutor::heard_done),
         })
@@ -464,6 +469,7 @@ impl Driver {
         self.heard = heard.iter().map(|message| message.sender).collect();
         let percept = RobotPercept { heard, ..self.percepts.percept(&situation, scan) };
         let control = self.program.decide(&percept)?;
+        self.decided_at = Some(at);
         self.memory = control.memory;
         // The last word stays until there is another one, as in a run.
         self.word = control.broadcast.or(self.word);
