@@ -16,7 +16,7 @@ impl ProcessFault {
     /// Returns a fault from two random words: a kill as often as a stop of at most five seconds.
     #[must_use]
     pub fn random(what: u32, how_long: u32) -> Self {
-        if what % 2 == 0 {
+        if what.is_multiple_of(2) {
             Self::Kill
         } else {
             Self::Stop(Duration::from_millis(100 + u64::from(how_long % 4_900)))

@@ -37,7 +37,7 @@ impl FlightPlan {
             let fault = ProcessFault::random(what, how_long);
             faults.push((at, who % airplanes, fault));
             // Often two at the same time: they forget each other.
-            if gap % 3 == 0 {
+            if gap.is_multiple_of(3) {
                 faults.push((at, (who + 1) % airplanes, fault));
             }
         }
