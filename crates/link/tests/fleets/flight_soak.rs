@@ -110,7 +110,7 @@ fn flights_whose_nodes_are_killed_and_stopped_stay_apart_and_are_replayed() {
             println!("  {fleet:?}");
         }
         check_recording(folder.path(), &summary);
-        let lives: u64 = fleet.nodes.iter().map(|node| u64::from(node.lives)).sum();
+        let lives: u64 = fleet.nodes.iter().map(|node| node.lives).sum();
         let names = ["late-controls", "unheard-cycles", "handed-over"];
         let [late, unheard, handed_over] = names.map(|name| counted(&fleet, name));
         let flown: u64 = fleet.nodes.iter().map(|node| node.flown).sum();
