@@ -144,6 +144,9 @@ pub struct FleetJob {
     pub replace: bool,
     /// Whether the folder gets a table of all packets.
     pub packets: bool,
+    /// The endpoint at which states and events are published, e.g. `tcp/127.0.0.1:7700`; port 0 for any free one.
+    #[serde(default)]
+    pub publish: Option<String>,
 }
 
 /// Job of one node: it decides for one agent, and sees nothing of the world but that agent's percepts.
@@ -209,6 +212,9 @@ pub struct FlightRecorderJob {
     pub out: Option<PathBuf>,
     /// Whether an earlier run there is replaced.
     pub replace: bool,
+    /// The endpoint at which states and events are published, e.g. `tcp/127.0.0.1:7700`; port 0 for any free one.
+    #[serde(default)]
+    pub publish: Option<String>,
 }
 
 /// The time of a flight without a server: each node goes by its own clock.
@@ -636,6 +642,8 @@ pub struct Tls {
 pub enum LinkMessage {
     /// It listens at these endpoints.
     Listens(Vec<String>),
+    /// It publishes states and events at this endpoint.
+    Publishes(String),
     /// The node of ROS 2 is there, with its first messages.
     Ros2(RosGraph),
     /// The present state of a robot that is driven.
