@@ -395,6 +395,9 @@ pub struct DriveJob {
     pub topics: DriveTopics,
     /// How it drives.
     pub settings: DriveSettings,
+    /// The navigator that moves it; none where its program sends velocities.
+    #[serde(default)]
+    pub navigator: Option<NavigatorSettings>,
     /// Number of trips after which it ends; none to end after the cycles of the scenario.
     pub trips: Option<u64>,
     /// File for the table of its motions.
@@ -428,6 +431,19 @@ pub struct DriveTopics {
     pub map_frame: String,
     /// The frame of the robot, if its pose is that frame's in `/tf` and not that of odometry.
     pub base_frame: Option<String>,
+}
+
+/// A navigator that moves a real robot, such as Nav2: by goals, in place of velocities.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NavigatorSettings {
+    /// The topic of its goals, `geometry_msgs/msg/PoseStamped`.
+    pub goal: String,
+    /// The name of its action, `nav2_msgs/action/NavigateToPose`, whose goals can be canceled.
+    pub action: String,
+    /// Largest distance in meters from the end of an action; none for 0.3 of a box.
+    pub tolerance_m: Option<f64>,
+    /// Time in seconds for which the robot may stand on its way before it counts as stopped by something.
+    pub stall_s: f64,
 }
 
 /// How a real robot drives, and the limits of its guard.
