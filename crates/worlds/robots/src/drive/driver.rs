@@ -480,8 +480,9 @@ impl Driver {
     ) -> DriveStep {
         let velocity = self.guard.limit(wanted, view);
         let guarded_by = self.guard.cause();
-        // A navigator would go on with the goal of an action that has taken too long.
-        let has_to_stand = guarded_by.is_some() || ended.as_ref().is_some_and(|it| it.is_timed_out);
+        // A navigator would go on with the goal of an action that has taken too long, or that something has stopped.
+        let is_given_up = |action: &DrivenAction| action.is_timed_out || action.contact.is_some();
+        let has_to_stand = guarded_by.is_some() || ended.as_ref().is_some_and(is_given_up);
         let order = if has_to_stand { NavigatorOrder::Stop } else { NavigatorOrder::Keep };
         DriveStep { velocity, order, ended, guarded_by }
     }

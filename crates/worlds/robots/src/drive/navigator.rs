@@ -153,8 +153,6 @@ impl NavigatorAction {
         }
         let order = match goal {
             Some(pose) => NavigatorOrder::Goal(NavigatorGoal { pose, number: self.number }),
-            // It could not go back, and would try that on.
-            None if self.contact.is_some() => NavigatorOrder::Stop,
             None => NavigatorOrder::Keep,
         };
         ActionProgress::Navigating(order)
@@ -208,5 +206,101 @@ impl NavigatorAction {
         let yaw_rad = self.start.yaw_rad;
         let is_back = dx_m * cos(yaw_rad) + dy_m * sin(yaw_rad) < 0.0;
         if is_back { Side::Back } else { Side::Front }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::ActionPlanner;
+    use super::*;
+    use crate::robots_run;
+    use crate::sensor::WALL;
+    use sidestep_planners::GridPose;
+    use sidestep_scenario::Source;
+
+    const FLOOR: &str = "format = 1\nworld = \"robots\"\nseed = 1\ncycles = 1\n[map]\nbox_size_m = 0.5\nascii = \"\"\"\n\
+        .....\n.....\n\"\"\"\n[[robots]]\nat = [[1, 0, 0]]\neffector = \"nomad\"\n";
+
+    const LIMITS: NavigatorLimits = NavigatorLimits {
+        tolerance_m: 0.15,
+        tolerance_rad: 0.3,
+        stall_s: 10.0,
+        resend_s: 4.0,
+        cycle_s: 1.0,
+        action_timeout_s: 60.0,
+    };
+
+    /// The number of the goal of an action that follows four goals.
+    const FIRST: u32 = 5;
+
+    /// Starts an action in the middle of box 1, facing east.
+    fn action(number: u8) -> (NavigatorAction, DriveState) {
+        let run = robots_run(&Source::new("s.toml", FLOOR, ""), 1).expect("a scenario");
+        let grid = BodyGrid::new(run.world(), 0).expect("a robot");
+        let planner = ActionPlanner::new(run.world(), 0).expect("two wheels");
+        let plan = planner.plan(number, GridPose { col: 1, row: 0, heading: 0 });
+        let pose = Pose2 { at_m: [0.75, 0.25], yaw_rad: 0.0 };
+        let state = DriveState { time_s: 0.0, pose, is_touching: false };
+        (NavigatorAction::start(LIMITS, &grid, plan, &state, WALL, FIRST), state)
+    }
+
+    fn at(state: &DriveState, time_s: f64, x_m: f64) -> DriveState {
+        let pose = Pose2 { at_m: [x_m, 0.25], ..state.pose };
+        DriveState { time_s, pose, ..*state }
+    }
+
+    fn goal(progress: ActionProgress) -> ([f64; 2], u32) {
+        match progress {
+            ActionProgress::Navigating(NavigatorOrder::Goal(goal)) => (goal.pose.at_m, goal.number),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_goal_is_where_the_action_ends_and_is_sent_again_to_a_robot_that_stands() {
+        let (mut action, state) = action(crate::effector::FORWARD);
+        assert_eq!(goal(action.update(&at(&state, 0.1, 0.75))), ([1.25, 0.25], FIRST));
+        let mut numbers = Vec::new();
+        for step in 1..90 {
+            numbers.push(goal(action.update(&at(&state, 0.1 * f64::from(step), 0.75))).1);
+        }
+        numbers.dedup();
+        assert_eq!(numbers, [FIRST, FIRST + 1, FIRST + 2]);
+        assert_eq!(goal(action.update(&at(&state, 9.1, 0.9))), ([1.25, 0.25], FIRST + 2));
+        let near = action.update(&at(&state, 9.2, 1.15));
+        let arrived = ActionOutcome { contact: None, is_timed_out: false };
+        assert_eq!(near, ActionProgress::Done(arrived));
+        assert_eq!(action.number(), FIRST + 2);
+    }
+
+    #[test]
+    fn a_robot_that_stands_for_long_is_sent_back_and_given_up_where_it_cannot_go_back() {
+        let (mut action, state) = action(crate::effector::FORWARD);
+        let mut ends = Vec::new();
+        for step in 1..300 {
+            let time_s = 0.1 * f64::from(step);
+            match action.update(&at(&state, time_s, 1.0)) {
+                ActionProgress::Navigating(NavigatorOrder::Goal(goal)) => ends.push(goal.pose.at_m),
+                ActionProgress::Done(outcome) => {
+                    let contact = outcome.contact.expect("something was in its way");
+                    assert_eq!((contact.side, outcome.is_timed_out), (Side::Front, false));
+                    ends.dedup();
+                    assert_eq!(ends, [[1.25, 0.25], [0.75, 0.25]]);
+                    return;
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        panic!("it never ends");
+    }
+
+    #[test]
+    fn a_new_touch_is_a_contact_and_an_old_one_is_none() {
+        let (mut action, state) = action(crate::effector::FORWARD);
+        let touching = DriveState { is_touching: true, ..at(&state, 0.1, 0.9) };
+        assert_eq!(goal(action.update(&touching)), ([0.75, 0.25], FIRST + 1));
+        let back = DriveState { is_touching: true, ..at(&state, 0.2, 0.85) };
+        let ActionProgress::Done(outcome) = action.update(&back) else { panic!("it is back") };
+        assert!(outcome.contact.is_some());
     }
 }
