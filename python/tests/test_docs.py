@@ -32,6 +32,7 @@ OF_PYTHON = (
     "FkResult",
     "Fleet",
     "FleetStatus",
+    "FlightOptions",
     "Finding",
     "IkResult",
     "ImportReport",

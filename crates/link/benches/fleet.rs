@@ -176,6 +176,7 @@ fn job(folder: &Path, clock: ClockMode) -> FleetJob {
         out: None,
         replace: false,
         packets: false,
+        publish: None,
     }
 }
 

@@ -84,6 +84,8 @@ pub enum EndpointKind {
     Subscription,
     /// The server of a service.
     Service,
+    /// A client of a service.
+    Client,
 }
 
 impl EndpointKind {
@@ -92,6 +94,7 @@ impl EndpointKind {
             Self::Publisher => "MP",
             Self::Subscription => "MS",
             Self::Service => "SS",
+            Self::Client => "SC",
         }
     }
 }

@@ -48,6 +48,7 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJ
         out: None,
         replace: false,
         packets: false,
+        publish: None,
     }
 }
 

@@ -53,6 +53,7 @@ pub(crate) fn recorder(folder: &Path) -> FlightRecorderJob {
         guard: guard(),
         out: Some(folder.join("run")),
         replace: false,
+        publish: None,
     }
 }
 

@@ -103,6 +103,7 @@ fn fleet_job(file: &Path) -> FleetJob {
         out: None,
         replace: false,
         packets: false,
+        publish: None,
     }
 }
 
