@@ -129,7 +129,10 @@ impl Navigator {
         if !cancel.is_warned && cancel.began_at.elapsed() >= CANCEL_TIMEOUT {
             cancel.is_warned = true;
             let service = &self.cancel_goal;
-            tracing::warn!(service, "the navigator does not answer: the robot may go on to its goal");
+            tracing::warn!(
+                service,
+                "the navigator does not answer: the robot may go on to its goal"
+            );
         }
         if cancel.asked_at.elapsed() < CANCEL_INTERVAL {
             return Ok(());

@@ -73,11 +73,8 @@ pub(super) fn run(job: &DriveJob, parent: &ParentMonitor) -> Result<(), Error> {
     let mut driver = Driver::of_scenario(building, &source, job.robot, limits, guard)?;
     if let Some(navigator) = &job.navigator {
         check_navigator(job, navigator, driver.takes_goals(), world.map.box_size_m)?;
-        driver = driver.with_navigator(navigator_limits(
-            navigator,
-            &job.settings,
-            world.map.box_size_m,
-        ));
+        driver =
+            driver.with_navigator(navigator_limits(navigator, &job.settings, world.map.box_size_m));
     }
     check_end(job, &driver)?;
     let peers = peer_topics(job, world)?;
@@ -207,8 +204,12 @@ fn check_navigator(
     let largest_m = MAX_NAVIGATOR_TOLERANCE_BOXES * box_m;
     match navigator.tolerance_m {
         Some(tolerance_m) if tolerance_m > largest_m => {
-            let cause = format!("a robot so far from the center of its box of {box_m} m may be in another one");
-            let remedy = format!("give at most {largest_m}, and a goal checker of the navigator that is content with less");
+            let cause = format!(
+                "a robot so far from the center of its box of {box_m} m may be in another one"
+            );
+            let remedy = format!(
+                "give at most {largest_m}, and a goal checker of the navigator that is content with less"
+            );
             Err(InputError::new(format!("--tolerance {tolerance_m}"), cause, remedy))
         }
         _ => Ok(()),

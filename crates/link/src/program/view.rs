@@ -38,12 +38,8 @@ impl ViewPublisher {
     pub(super) fn publish_view(&mut self, fleet: &FleetStatus, is_over: bool) {
         let Some(frame) = &self.frame else { return };
         self.number += 1;
-        let view = FleetFrame {
-            number: self.number,
-            frame: frame.clone(),
-            fleet: fleet.clone(),
-            is_over,
-        };
+        let view =
+            FleetFrame { number: self.number, frame: frame.clone(), fleet: fleet.clone(), is_over };
         self.server.set_latest(self.number, to_json(&view));
     }
 

@@ -186,10 +186,8 @@ fn metrics_of_a_recorder_and_of_a_node_without_a_server_are_those_of_a_flight() 
     let folder = folder(&ring(3, 30, ""));
     let [at_recorder, at_node] = free_addresses();
     let job = recorder(folder.path());
-    let at = |address: &String| CommonSettings {
-        metrics: Some(address.clone()),
-        ..job.common.clone()
-    };
+    let at =
+        |address: &String| CommonSettings { metrics: Some(address.clone()), ..job.common.clone() };
     let any_port = vec!["tcp/127.0.0.1:0".to_string()];
     let node = LinkProcess::start(&Job::Flight(Box::new(FlightJob {
         common: at(&at_node),

@@ -182,10 +182,8 @@ fn a_listener_that_comes_late_to_a_flight_without_a_server_asks_for_the_events_b
         return;
     }
     let folder = folder(&ring(3, 30, ""));
-    let job = FlightRecorderJob {
-        publish: Some("tcp/127.0.0.1:0".into()),
-        ..recorder(folder.path())
-    };
+    let job =
+        FlightRecorderJob { publish: Some("tcp/127.0.0.1:0".into()), ..recorder(folder.path()) };
     let program = LinkProcess::start(&Job::FlightRecorder(Box::new(job)));
     let endpoint = publishes(&program);
     program.fleet("some cycles", |now| now.cycle >= 8);

@@ -523,8 +523,7 @@ fn what_a_navigator_cannot_pass_is_a_contact_and_a_drive_that_ends_takes_its_goa
     let walls: Vec<[u32; 2]> = (0..8).map(|row| [3, row]).collect();
     let more = json!({ "navigator": true, "pace": 4.0, "walls": walls });
     let mut plants = Plants::start_with(&[robots[0].0], more);
-    let mut drive =
-        DriveProcess::start(navigated_job(&folder.path("s.toml"), 0, plants.port));
+    let mut drive = DriveProcess::start(navigated_job(&folder.path("s.toml"), 0, plants.port));
     let blocked = drive.wait_for(|status| status.contacts >= 2);
     assert_eq!(blocked.timeouts, 0, "{blocked:?}");
     let at = blocked.at.expect("it has moved");
@@ -541,7 +540,8 @@ fn what_a_navigator_cannot_pass_is_a_contact_and_a_drive_that_ends_takes_its_goa
 #[test]
 fn a_robot_does_not_take_the_goals_of_its_navigator_for_its_own_nor_a_tolerance_of_half_a_box() {
     let folder = ScenarioFolder::new(
-        &scenario(&[([0, 0, 0], [10, 6])]).replace("\"goto\", goals = [[10, 6]], avoidance = \"plan\"", "\"external\""),
+        &scenario(&[([0, 0, 0], [10, 6])])
+            .replace("\"goto\", goals = [[10, 6]], avoidance = \"plan\"", "\"external\""),
     );
     let same = navigated_job(&folder.path("s.toml"), 0, 9);
     let mut same = DriveJob { trips: None, ..same };
