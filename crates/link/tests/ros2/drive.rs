@@ -501,7 +501,8 @@ fn a_navigator_moves_a_robot_from_box_to_box_and_is_asked_to_stop_when_measureme
     assert!(silent["has_goal"] == false && silent["cancels"].as_u64() >= Some(1), "{silent}");
     plants.ask("speak");
     let end = drive.end();
-    assert_eq!((end.trips, end.contacts, end.timeouts, end.old_states), (1, 0, 0, 1), "{end:?}");
+    assert_eq!((end.trips, end.contacts, end.timeouts), (1, 0, 0), "{end:?}");
+    assert!(end.old_states >= 1, "{end:?}");
     assert!(drive.wait(), "it ends well");
     let report = plants.ask("report")[0].clone();
     assert!(is_at(&report, [10, 6]), "{report}");
@@ -518,7 +519,8 @@ fn what_a_navigator_cannot_pass_is_a_contact_and_a_drive_that_ends_takes_its_goa
         return;
     }
     let robots = [([0, 5, 0], [6, 5])];
-    let folder = ScenarioFolder::new(&scenario(&robots));
+    let text = scenario(&robots).replace("avoidance = \"plan\"", "avoidance = \"touch\"");
+    let folder = ScenarioFolder::new(&text);
     // A wall across the hall that its map does not have: there is no way.
     let walls: Vec<[u32; 2]> = (0..8).map(|row| [3, row]).collect();
     let more = json!({ "navigator": true, "pace": 4.0, "walls": walls });
