@@ -30,7 +30,7 @@ from ._errors import (
     ReplayError,
     SidestepError,
 )
-from ._fleet import Fleet, FleetStatus, FlightOptions, NodeStatus
+from ._fleet import Fleet, FleetStatus, NodeStatus
 from ._inspect import Finding, ImportReport, inspect
 from ._native import (
     Arm,
@@ -66,7 +66,6 @@ __all__ = [
     "Fleet",
     "FleetError",
     "FleetStatus",
-    "FlightOptions",
     "IkResult",
     "ImportReport",
     "InputError",

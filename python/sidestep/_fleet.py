@@ -48,10 +48,8 @@ class NodeStatus:
     heard: int
     #: Number of its controls that were carried out.
     flown: int
-    #: Number of its controls that came late, or not at all; without a server those that the recorder does not know.
+    #: Number of its controls that came late, or not at all.
     late: int
-    #: Number of reports that differ from what is recorded, without a server.
-    differing: int
     #: Number of times that it has joined.
     lives: int
     #: Packets that it has sent, and their bytes.
@@ -63,8 +61,6 @@ class NodeStatus:
     processor_ms: int | None
     #: Seconds since it was last heard; None before it has joined.
     silent_s: float | None
-    #: What a node without a server has counted, by name, e.g. ``"late-controls"``.
-    counts: dict[str, int]
 
 
 @dataclass(frozen=True)
@@ -104,62 +100,8 @@ class FleetStatus:
         return _notebook.rows(heads, cells, f"cycle {self.cycle} of {self.cycles}")
 
 
-@dataclass(frozen=True, kw_only=True)
-class FlightOptions:
-    """How airplanes fly without a server, and the limits of the guard beside each.
-
-    A guard hands its airplane over to the autopilot where a limit is exceeded.
-    """
-
-    #: Seconds by which the clocks of two nodes may differ.
-    clock_tolerance_s: float = 0.1
-    #: Seconds by which the model of a vehicle lags behind.
-    model_lag_s: float = 0.0
-    #: Largest error in meters of each coordinate that the model measures.
-    model_noise_m: float = 0.0
-    #: Largest distance in meters from where it is to be; None for any.
-    max_deviation_m: float | None = None
-    #: Largest age in seconds of its measurements.
-    max_age_s: float = 1.0
-    #: Seconds that may pass without a sign of life of the node's program.
-    program_timeout_s: float = 5.0
-    #: Seconds before the start from which on it flies straight toward its first pose; 0 to wait there.
-    run_up_s: float = 0.0
-    #: A circle that it must not leave: its center ``(x, y)`` and its radius, in meters.
-    fence_circle_m: tuple[tuple[float, float], float] | None = None
-    #: The corners of a polygon that it must not leave: ``(x, y)`` in meters, on the earth latitudes and longitudes in degrees.
-    fence_polygon: Sequence[tuple[float, float]] = ()
-    #: The lowest and the highest altitude in meters.
-    fence_altitude_m: tuple[float, float] | None = None
-
-    def _job(self, speed: float, listen: list[str]) -> dict[str, Any]:
-        """Returns the part of a recorder's job that differs from that of a server."""
-
-        def seconds(name: str) -> float:
-            return _checked_float(name, getattr(self, name), 0.0, 86_400.0)
-
-        noise_m = _checked_float("model_noise_m", self.model_noise_m, 0.0, 1e6)
-        return {
-            "clock": {"start_s": None, "speed": speed, "tolerance_s": seconds("clock_tolerance_s")},
-            "network": {"listen": listen, "peers": [], "is_scouting": False},
-            "plant": {"model": {"lag_s": seconds("model_lag_s"), "noise_m": noise_m}},
-            "guard": {
-                "fence": {
-                    "circle": self.fence_circle_m,
-                    "polygon": [list(corner) for corner in self.fence_polygon],
-                    "altitude_m": self.fence_altitude_m,
-                },
-                "max_deviation_m": self.max_deviation_m,
-                "max_age_s": seconds("max_age_s"),
-                "patience_s": seconds("program_timeout_s"),
-                "run_up_s": seconds("run_up_s"),
-            },
-        }
-
-
 class Fleet:
-    """A fleet that is flown: a world at a server, and each of its agents as a process, as ``sidestep fleet`` does it; or
-    airplanes without a server.
+    """A fleet that is flown: a world at a server, and each of its agents as a process, as ``sidestep fleet`` does it.
 
     It starts at once. Iterate over it to watch it, :meth:`wait` for its end, or :meth:`end` it before; as a context it ends
     with the block. No process is left over, however this one ends. In lockstep it comes out as
@@ -175,12 +117,6 @@ class Fleet:
     overwrite one, ``packets`` records every packet there. ``lease_s`` is the silence in seconds after which a party is taken
     to be gone, ``insecure`` allows links without certificates that leave this machine, ``tls`` has the files of
     certificates: ``(authority, certificate, key)``. ``log`` is the least severe log level that :attr:`log` keeps.
-    ``publish`` is an endpoint at which states and events are published for programs of yours, e.g.
-    ``"tcp/127.0.0.1:0"``; :attr:`publishes` has its port.
-
-    With ``no_server=True`` airplanes fly without a server, in real time and with models of vehicles: nodes know each other by
-    their reports, and a recorder only listens. ``flight`` has their :class:`FlightOptions`; ``clock``, ``topology`` and
-    ``packets`` are for servers.
 
     Raises InputError for wrong arguments, and where the program is not found. What is wrong with the scenario for a fleet is
     raised by :meth:`wait`, and by iterating.
@@ -209,9 +145,6 @@ class Fleet:
         insecure: bool = False,
         tls: tuple[str | os.PathLike[str], str | os.PathLike[str], str | os.PathLike[str]] | None = None,
         log: str = "warn",
-        publish: str | None = None,
-        no_server: bool = False,
-        flight: FlightOptions | None = None,
     ) -> None:
         if clock not in ("lockstep", "realtime"):
             raise input_error("clock", f"is {clock!r}", 'give "lockstep" or "realtime"')
@@ -221,19 +154,12 @@ class Fleet:
             raise input_error("listen", f"is {listen!r}", f"give a list: [{listen!r}]")
         if (packets or replace) and out is None:
             raise input_error("packets" if packets else "replace", "needs a folder", "give out, too")
-        if flight is not None and not no_server:
-            raise input_error("flight", "is for airplanes without a server", "give no_server=True, too")
-        # Recorders have no choice of these.
-        for name, given in (("clock", clock != "lockstep"), ("topology", topology is not None), ("packets", packets)):
-            if no_server and given:
-                raise input_error(name, "is for fleets with a server", "leave it out, or no_server")
         program = _find_program()
         self._folder = tempfile.TemporaryDirectory(prefix="sidestep-fleet-")
         protocol = "tcp" if tls is None else "tls"
         is_local = nodes is None and not listen and tls is None
         if topology is None:
             topology = "multicast" if is_local and _native.has_loopback_multicast() else "mesh"
-        speed = _checked_float("speed", speed, 0.01, 1000.0)
         job = {
             "common": {
                 "flown": {
@@ -251,24 +177,18 @@ class Fleet:
                 "log": str(log),
             },
             "nodes": None if nodes is None else checked_int("nodes", nodes, 0, 1_000_000),
+            "clock": "lockstep"
+            if clock == "lockstep"
+            else {"realtime": {"speed": _checked_float("speed", speed, 0.01, 1000.0)}},
+            "topology": topology,
+            "multicast_group": None,
+            "listen": list(listen) or [f"{protocol}/127.0.0.1:0"],
             "out": None if out is None else _absolute(out),
             "replace": bool(replace),
-            "publish": None if publish is None else str(publish),
+            "packets": bool(packets),
         }
-        if no_server:
-            job |= (flight or FlightOptions())._job(speed, list(listen))
-        else:
-            job |= {
-                "clock": "lockstep" if clock == "lockstep" else {"realtime": {"speed": speed}},
-                "topology": topology,
-                "multicast_group": None,
-                "listen": list(listen) or [f"{protocol}/127.0.0.1:0"],
-                "packets": bool(packets),
-            }
         #: The endpoints at which the server listens; empty before it does.
         self.listens: list[str] = []
-        #: The endpoint at which states and events are published; None before they are, and without ``publish``.
-        self.publishes: str | None = None
         #: The last status; None before the first one.
         self.status: FleetStatus | None = None
         #: The summary of the run, as in ``summary.json``; None before the end.
@@ -287,7 +207,7 @@ class Fleet:
         self._logger = threading.Thread(target=_read_log, args=(self._process.stderr, self.log), daemon=True)
         self._logger.start()
         try:
-            stdin.write(json.dumps({"flight-recorder" if no_server else "fleet": job}).encode() + b"\n")
+            stdin.write(json.dumps({"fleet": job}).encode() + b"\n")
             stdin.flush()
         except BrokenPipeError:
             # It has ended, and its own message says why.
@@ -369,8 +289,6 @@ class Fleet:
         match message:
             case {"listens": endpoints}:
                 self.listens = endpoints
-            case {"publishes": endpoint}:
-                self.publishes = endpoint
             case {"fleet": status}:
                 self.status = _status(status)
             case {"ended": ended}:
@@ -488,7 +406,7 @@ def _checked_float(name: str, value: float, low: float, high: float) -> float:
 
 
 def _status(status: dict[str, Any]) -> FleetStatus:
-    nodes = [NodeStatus(**{**_fields(NodeStatus, node), "counts": dict(node["counts"])}) for node in status["nodes"]]
+    nodes = [NodeStatus(**_fields(NodeStatus, node)) for node in status["nodes"]]
     return FleetStatus(**{**_fields(FleetStatus, status), "nodes": nodes})
 
 

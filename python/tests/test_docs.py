@@ -32,7 +32,6 @@ OF_PYTHON = (
     "FkResult",
     "Fleet",
     "FleetStatus",
-    "FlightOptions",
     "Finding",
     "IkResult",
     "ImportReport",

@@ -102,38 +102,6 @@ def test_a_block_that_is_left_ends_the_fleet_and_all_of_its_processes():
     fleet.end()
 
 
-def test_airplanes_without_a_server_fly_as_one_process_and_publish_what_happens():
-    ring = {
-        "world": "airspace",
-        "seed": 3,
-        "cycles": 12,
-        "airspace": {
-            "deployment": "replica-team",
-            "groups": "heard",
-            "dt_s": 2.0,
-            "max_rounds": 20,
-            "network": {"deadline_s": 0.7, "patience_s": 0.08},
-            "generator": {"kind": "superconflict", "n": 3, "radius_m": 200.0, "jitter_m": 5.0},
-        },
-        "airplane": {"v_m_s": 10.0, "omega_max_deg_s": 20.0, "separation_m": 30.0, "nic": 11},
-    }
-    # Limits that no busy machine exceeds.
-    patient = sidestep.FlightOptions(clock_tolerance_s=30.0, max_age_s=300.0, program_timeout_s=300.0, model_lag_s=0.3)
-    with sidestep.Fleet(ring, speed=4.0, no_server=True, flight=patient, publish="tcp/127.0.0.1:0") as fleet:
-        last = list(fleet)[-1]
-        summary = fleet.wait()
-    assert fleet.publishes.startswith("tcp/127.0.0.1:") and not fleet.publishes.endswith(":0")
-    assert [node.differing for node in last.nodes] == [0] * 3
-    assert all(node.processor_ms > 0 and node.frame_bytes > node.bytes > 0 for node in last.nodes)
-    assert summary["metrics"]["losses_of_separation"] == 0
-    late = last.late + sum(node.counts.get(name, 0) for node in last.nodes for name in ("late-controls", "late-cycles"))
-    unheard = sum(node.counts.get("unheard-cycles", 0) for node in last.nodes)
-    if late + unheard == 0:
-        sim = sidestep.Simulation(ring)
-        sim.run(12)
-        assert summary["digest"] == sim.digest
-
-
 def test_a_fleet_that_cannot_be_flown_says_why_and_what_would_be_right(monkeypatch):
     with pytest.raises(sidestep.InputError, match="one process decides for all") as direct:
         sidestep.Fleet(RING, set={"airspace.deployment": "direct"}).wait()
@@ -146,9 +114,6 @@ def test_a_fleet_that_cannot_be_flown_says_why_and_what_would_be_right(monkeypat
         ({"speed": float("nan"), "clock": "realtime"}, "give a number from 0.01 to 1000"),
         ({"lease_s": 0.0}, "give a number from 0.1 to 86400"),
         ({"nodes": -1}, "give a number from 0 to"),
-        ({"flight": sidestep.FlightOptions()}, "give no_server=True, too"),
-        ({"no_server": True, "topology": "star"}, "is for fleets with a server"),
-        ({"no_server": True, "flight": sidestep.FlightOptions(model_lag_s=-1.0)}, "give a number from 0 to 86400"),
     ]:
         with pytest.raises(sidestep.InputError, match=said):
             sidestep.Fleet(ROBOTS, **wrong)

@@ -176,7 +176,6 @@ fn job(folder: &Path, clock: ClockMode) -> FleetJob {
         out: None,
         replace: false,
         packets: false,
-        publish: None,
     }
 }
 

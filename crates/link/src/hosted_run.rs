@@ -2,22 +2,10 @@
 
 use crate::agent::{AgentPercept, InvalidControl, SerializedControls};
 use crate::distributed::DistributedWorld;
-use sidestep::kernel::view::{Frame, FrameOptions, LogEvent};
+use sidestep::kernel::view::{Frame, FrameOptions};
 use sidestep::kernel::{Cycle, EntityId, Simulation};
 use sidestep_session::{Error, ManagedRun, Watcher};
 use std::sync::Arc;
-
-/// Most events of a frame for viewers, who get the last ones: a viewer may have missed any of the frames before.
-const MAX_VIEW_EVENTS: usize = 200;
-
-/// Receives every frame of a run.
-pub trait FrameObserver {
-    /// Receives the frame before the first cycle, or after one, with the events since the frame before.
-    fn on_frame(&mut self, frame: &Frame);
-
-    /// Is called when there is no further frame.
-    fn on_end(&mut self);
-}
 
 /// A run whose agents are nodes.
 ///
@@ -30,9 +18,6 @@ pub struct HostedRun {
     /// Controls of the present cycle.
     controls: SerializedControls,
     keeps_events: bool,
-    observer: Option<Box<dyn FrameObserver>>,
-    /// The newest frame that the observer has received, with events that no viewer has; none once a viewer has it.
-    unviewed: Option<Frame>,
 }
 
 impl HostedRun {
@@ -42,30 +27,11 @@ impl HostedRun {
         world: Arc<dyn DistributedWorld>,
         watcher: &'static dyn Watcher,
     ) -> Self {
-        Self {
-            run,
-            watcher,
-            world,
-            controls: Vec::new(),
-            keeps_events: false,
-            observer: None,
-            unviewed: None,
-        }
-    }
-
-    /// Returns the same run with an observer, which receives the present frame at once.
-    #[must_use]
-    pub fn with_observer(mut self, observer: Box<dyn FrameObserver>) -> Self {
-        self.observer = Some(observer);
-        self.show_observer();
-        self
+        Self { run, watcher, world, controls: Vec::new(), keeps_events: false }
     }
 
     /// Returns the run, to be finished.
     pub fn into_managed_run(self) -> ManagedRun {
-        if let Some(mut observer) = self.observer {
-            observer.on_end();
-        }
         self.run
     }
 
@@ -145,32 +111,11 @@ impl HostedRun {
         }
         let next = self.run.cycle() + 1;
         self.run.advance_to(next, self.watcher)?;
-        self.show_observer();
         Ok(invalid)
     }
 
-    /// Shows the observer the present frame, and keeps it for viewers: each event is in one frame only.
-    fn show_observer(&mut self) {
-        if self.observer.is_none() {
-            return;
-        }
-        let mut frame = self.take_frame();
-        if let Some(observer) = &mut self.observer {
-            observer.on_frame(&frame);
-        }
-        if let Some(unviewed) = self.unviewed.take() {
-            frame.log_left_out += unviewed.log_left_out;
-            prepend_events(&mut frame, unviewed.log);
-        }
-        self.unviewed = Some(frame);
-    }
-
-    /// Returns the present frame for viewers, with the events since the one before. The state of the run does not change.
+    /// Returns the present frame, with the events since the frame before. The state of the run does not change.
     pub fn frame(&mut self) -> Frame {
-        self.unviewed.take().unwrap_or_else(|| self.take_frame())
-    }
-
-    fn take_frame(&mut self) -> Frame {
         let simulation = self.run.simulation_mut();
         // The simulation keeps events from the first frame on: without a viewer nobody would ever take them.
         if !self.keeps_events {
@@ -179,13 +124,4 @@ impl HostedRun {
         }
         simulation.frame(FrameOptions::WITHOUT_SCANS)
     }
-}
-
-/// Adds earlier events to a frame for viewers, as far as there is room; those that go are counted.
-pub(crate) fn prepend_events(frame: &mut Frame, mut earlier: Vec<LogEvent>) {
-    earlier.append(&mut frame.log);
-    let excess = earlier.len().saturating_sub(MAX_VIEW_EVENTS);
-    earlier.drain(..excess);
-    frame.log_left_out += excess as u64;
-    frame.log = earlier;
 }

@@ -19,7 +19,6 @@
 //! hosted_run.rs      the recorded run at the server
 //! server/            the server of the world
 //! vehicle/           programs of users that decide in place of an agent's own, over a public wire
-//! stream/            states and events of a fleet, for programs of users, over the public wire
 //! node/              the node of an agent
 //! ros2/              a run as a node of ROS 2, without ROS
 //! vda5050/           vehicles of a warehouse that carry out a plan (its broker.rs opens a socket, too)
@@ -55,7 +54,6 @@ mod robots;
 pub mod ros2;
 pub mod server;
 pub mod signature;
-mod stream;
 pub mod vda5050;
 pub mod vehicle;
 pub mod wire;

@@ -5,7 +5,6 @@
 //! loria/           the source paper of the robots world
 //! serpentine/      the source of the chain world
 //! mapf/            a study of planners and of deciding alone, on wheels that err
-//! drives.rs        what robots have done in drives, beside what a simulation predicts
 //! methods.rs       methods of the airspace world on the same traffic
 //! study.rs         a sweep file and its scenario -> the table of its runs
 //! scene.rs         the content of a picture
@@ -22,7 +21,7 @@
 pub mod agentfly;
 mod case_results;
 mod claims;
-pub mod drives;
+
 pub mod loria;
 pub mod mapf;
 pub mod methods;

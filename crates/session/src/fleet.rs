@@ -144,9 +144,6 @@ pub struct FleetJob {
     pub replace: bool,
     /// Whether the folder gets a table of all packets.
     pub packets: bool,
-    /// The endpoint at which states and events are published, e.g. `tcp/127.0.0.1:7700`; port 0 for any free one.
-    #[serde(default)]
-    pub publish: Option<String>,
 }
 
 /// Job of one node: it decides for one agent, and sees nothing of the world but that agent's percepts.
@@ -212,9 +209,6 @@ pub struct FlightRecorderJob {
     pub out: Option<PathBuf>,
     /// Whether an earlier run there is replaced.
     pub replace: bool,
-    /// The endpoint at which states and events are published, e.g. `tcp/127.0.0.1:7700`; port 0 for any free one.
-    #[serde(default)]
-    pub publish: Option<String>,
 }
 
 /// The time of a flight without a server: each node goes by its own clock.
@@ -395,9 +389,6 @@ pub struct DriveJob {
     pub topics: DriveTopics,
     /// How it drives.
     pub settings: DriveSettings,
-    /// The navigator that moves it; none where its program sends velocities.
-    #[serde(default)]
-    pub navigator: Option<NavigatorSettings>,
     /// Number of trips after which it ends; none to end after the cycles of the scenario.
     pub trips: Option<u64>,
     /// File for the table of its motions.
@@ -431,19 +422,6 @@ pub struct DriveTopics {
     pub map_frame: String,
     /// The frame of the robot, if its pose is that frame's in `/tf` and not that of odometry.
     pub base_frame: Option<String>,
-}
-
-/// A navigator that moves a real robot, such as Nav2: by goals, in place of velocities.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NavigatorSettings {
-    /// The topic of its goals, `geometry_msgs/msg/PoseStamped`.
-    pub goal: String,
-    /// The name of its action, `nav2_msgs/action/NavigateToPose`, whose goals can be canceled.
-    pub action: String,
-    /// Largest distance in meters from the end of an action; none for 0.3 of a box.
-    pub tolerance_m: Option<f64>,
-    /// Time in seconds for which the robot may stand on its way before it counts as stopped by something.
-    pub stall_s: f64,
 }
 
 /// How a real robot drives, and the limits of its guard.
@@ -658,8 +636,6 @@ pub struct Tls {
 pub enum LinkMessage {
     /// It listens at these endpoints.
     Listens(Vec<String>),
-    /// It publishes states and events at this endpoint.
-    Publishes(String),
     /// The node of ROS 2 is there, with its first messages.
     Ros2(RosGraph),
     /// The present state of a robot that is driven.

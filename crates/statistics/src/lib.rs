@@ -17,10 +17,7 @@ pub use interval::{
 };
 pub use moments::{Moments, Sample, is_tied, is_tied_measure, mean, percentile, sample_sd};
 pub use paired::{MIN_TEST_PAIRS, Pairs, holm};
-pub use quantile::{
-    MIN_PREDICTION_VALUES, QuantileInterval, prediction_interval, quantile_interval,
-    runs_for_quantile,
-};
+pub use quantile::{QuantileInterval, quantile_interval, runs_for_quantile};
 pub use rank::{Correlation, rank_correlation};
 pub use stopping::{StopDecision, StopReason, StoppingRule};
 

@@ -44,21 +44,6 @@ pub fn quantile_interval(sorted: &[f64], q: f64) -> Option<QuantileInterval> {
     Some(QuantileInterval { interval, ranks: (low, high), coverage })
 }
 
-/// The smallest number of values for which [`prediction_interval`] has an answer.
-pub const MIN_PREDICTION_VALUES: usize = 39;
-
-/// Returns an interval that contains one more value of the distribution that the values of `sorted` come from, of any kind, with
-/// a probability of at least 95 %, by order statistics: a further value is as likely at each of the `n + 1` places between and
-/// beside the others (Wilks 1941, "Determination of sample sizes for setting tolerance limits").
-///
-/// `None` for less than [`MIN_PREDICTION_VALUES`].
-pub fn prediction_interval(sorted: &[f64]) -> Option<Interval> {
-    let n = sorted.len();
-    // Beyond each end lie as many of the places.
-    let rank = (MAX_TAIL_PROBABILITY * (n + 1) as f64).floor() as usize;
-    (rank >= 1).then(|| Interval { low: sorted[rank - 1], high: sorted[n - rank] })
-}
-
 /// Returns the smallest number of runs for which [`quantile_interval`] has an answer: 6 for the
 /// median, 72 for the 5th and 95th percentile. `None` for `q` outside (0, 1).
 pub fn runs_for_quantile(q: f64) -> Option<usize> {
@@ -107,14 +92,6 @@ mod tests {
 
     fn ranks(n: usize) -> Vec<f64> {
         (1..=n).map(|i| i as f64).collect()
-    }
-
-    #[test]
-    fn one_more_value_is_within_a_prediction_interval_with_the_probability_that_ranks_have() {
-        let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
-        assert_eq!(prediction_interval(&sorted), Some(Interval { low: 2.0, high: 99.0 }));
-        assert_eq!(prediction_interval(&sorted[..39]), Some(Interval { low: 1.0, high: 39.0 }));
-        assert_eq!(prediction_interval(&sorted[..MIN_PREDICTION_VALUES - 1]), None);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use sidestep::kernel::EntityId;
 use sidestep::kernel::text::key_value_pair;
 use sidestep_session::fleet::{
     BeaconCounts, CommonSettings, DriveJob, DriveSettings, DriveStatus, DriveTopics, Job,
-    JobScenario, LinkMessage, NavigatorSettings, PlanStatus, RosGraph, RosNetwork,
+    JobScenario, LinkMessage, PlanStatus, RosGraph, RosNetwork,
 };
 use std::path::PathBuf;
 
@@ -31,8 +31,6 @@ Examples:
   sidestep drive hall.toml --robot 2 --namespace hall/r2 --peers 'hall/r{}'
                                    it hears what the programs of the other
                                    robots tell, and keeps to a common plan
-  sidestep drive hall.toml --robot 2 --base base_link --nav2
-                                   Nav2 moves it from box to box
 
 The program sidestep-link does it: `cargo install --path crates/link`. The robot needs no Sidestep: \
 it is a node of rmw_zenoh with odometry or frames, a laser, and a topic for velocities. It stands \
@@ -74,47 +72,6 @@ pub(crate) struct DriveArgs {
 
     #[command(flatten)]
     limits: LimitArgs,
-
-    #[command(flatten)]
-    navigator: NavigatorArgs,
-}
-
-/// The navigator that moves the robot.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Nav2")]
-struct NavigatorArgs {
-    /// Send goals to Nav2, which moves the robot and keeps clear of what it sees, in place of velocities
-    #[arg(long)]
-    nav2: bool,
-
-    /// Topic of its goals (geometry_msgs/PoseStamped)
-    #[arg(long, value_name = "TOPIC", default_value = "goal_pose", requires = "nav2")]
-    nav2_goal: String,
-
-    /// Name of its action (nav2_msgs/NavigateToPose), whose goals are canceled where the robot has
-    /// to stand
-    #[arg(long, value_name = "NAME", default_value = "navigate_to_pose", requires = "nav2")]
-    nav2_action: String,
-
-    /// Distance in m from the end of an action at which that is done; more than the tolerance of
-    /// the goal checker [default: 0.3 of a box]
-    #[arg(long, value_name = "M", requires = "nav2", value_parser = parse_limit)]
-    tolerance: Option<f64>,
-
-    /// Seconds of standing on the way after which something is in the way
-    #[arg(long, value_name = "S", default_value_t = 10.0, requires = "nav2", value_parser = parse_limit)]
-    stall: f64,
-}
-
-impl NavigatorArgs {
-    fn settings(&self) -> Option<NavigatorSettings> {
-        self.nav2.then(|| NavigatorSettings {
-            goal: self.nav2_goal.clone(),
-            action: self.nav2_action.clone(),
-            tolerance_m: self.tolerance,
-            stall_s: self.stall,
-        })
-    }
 }
 
 /// The network of the robot.
@@ -275,7 +232,6 @@ impl DriveArgs {
             network: self.network.network(),
             topics: self.topics.topics(),
             settings: self.limits.settings(),
-            navigator: self.navigator.settings(),
             trips: self.trips,
             out: self.out.clone(),
             bag: self.bag.clone(),

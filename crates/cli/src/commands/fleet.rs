@@ -115,11 +115,6 @@ pub(crate) struct FleetArgs {
     #[arg(long, requires = "out")]
     packets: bool,
 
-    /// Publish states and events, for programs of yours, at this endpoint, e.g. tcp/127.0.0.1:7700;
-    /// port 0 for any free one (see examples/listener.py)
-    #[arg(long, value_name = "ENDPOINT")]
-    publish: Option<String>,
-
     /// Fly airplanes without a server: nodes know each other by their reports, and this command only
     /// records. In real time, with models of vehicles
     #[arg(long, conflicts_with_all = ["clock", "topology", "multicast_group", "packets"])]
@@ -180,9 +175,6 @@ pub(crate) fn fleet(args: &FleetArgs, console: Console) -> Result<ExitCode, Fail
                 console.note(format!("The server listens at {}", endpoints.join(", ")));
             }
         }
-        LinkMessage::Publishes(endpoint) => {
-            console.note(format!("States and events are published at {endpoint}"));
-        }
         LinkMessage::Fleet(now) => table.update(&now),
         LinkMessage::Ended { summary, outcome, fleet } => {
             end = Some(FleetEnd { topology, summary, outcome, fleet });
@@ -232,12 +224,8 @@ fn usage_line(fleet: &FleetStatus) -> Option<(String, String)> {
         format!("{} % of a processor, ", format_short(percent))
     });
     let kilobytes = format_short(1e-3 * bytes as f64 / node_s);
-    let mut usage = format!("{processor}{kilobytes} kB/s");
-    // A recorder only listens.
-    if fleet.server_frame_bytes > 0 {
-        let server = format_short(1e-3 * fleet.server_frame_bytes as f64 / fleet.flown_s);
-        usage += &format!("; the server {server} kB/s");
-    }
+    let server_kilobytes = format_short(1e-3 * fleet.server_frame_bytes as f64 / fleet.flown_s);
+    let usage = format!("{processor}{kilobytes} kB/s; the server {server_kilobytes} kB/s");
     Some(key_value_pair("a node", usage))
 }
 
@@ -292,7 +280,6 @@ impl FleetArgs {
             out: self.out.clone(),
             replace: self.replace,
             packets: self.packets,
-            publish: self.publish.clone(),
         }
     }
 
@@ -317,7 +304,6 @@ impl FleetArgs {
             guard: self.guard.settings(),
             out: self.out.clone(),
             replace: self.replace,
-            publish: self.publish.clone(),
         }
     }
 
@@ -405,11 +391,11 @@ impl FleetArgs {
             );
             lines.push(key_value_pair("late", late));
         }
-        // Without a server there are no percepts from one.
+        // Without a server there are no percepts from one, and the recorder has lines of its own for the rest.
         if fleet.server_frame_bytes > 0 {
             lines.extend(latency_line(fleet));
+            lines.extend(usage_line(fleet));
         }
-        lines.extend(usage_line(fleet));
         if restarted > 0 {
             lines.push(key_value_pair("restarted", format!("{restarted} nodes")));
         }
@@ -474,8 +460,6 @@ mod tests {
         assert_eq!(usage, "2.50 % of a processor, 5.00 kB/s; the server 20.0 kB/s");
         let untold = usage_line(&fleet_of_two(None)).expect("it ran").1;
         assert_eq!(untold, "5.00 kB/s; the server 20.0 kB/s");
-        let flight = FleetStatus { server_frame_bytes: 0, ..fleet_of_two(None) };
-        assert_eq!(usage_line(&flight).expect("it flew").1, "5.00 kB/s");
         assert_eq!(usage_line(&FleetStatus::default()), None, "nothing has run");
     }
 }

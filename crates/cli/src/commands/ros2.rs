@@ -173,7 +173,6 @@ pub(crate) fn run_as_node(
         LinkMessage::Failed(_)
         | LinkMessage::Drives(_)
         | LinkMessage::Driven(_)
-        | LinkMessage::Publishes(_)
         | LinkMessage::Flight(_)
         | LinkMessage::Fleet(_)
         | LinkMessage::Scene(_)

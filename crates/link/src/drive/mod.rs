@@ -21,7 +21,6 @@ use sidestep::worlds::robots::drive::controller::DriveState;
 use sidestep::worlds::robots::drive::driver::{DriveStep, Driver};
 use sidestep::worlds::robots::drive::grid::Pose2;
 use sidestep::worlds::robots::drive::guard::{GuardCause, GuardView};
-use sidestep::worlds::robots::drive::navigator::NavigatorOrder;
 use sidestep::worlds::robots::drive::plan_executor::{PlanExecutor, PlanHold};
 use sidestep_session::fleet::{DriveStatus, PlanStatus};
 use std::time::{Duration, Instant};
@@ -127,11 +126,7 @@ impl<'a, P: Plant> Drive<'a, P> {
             self.hear();
             let mut is_news = false;
             if let Some(step) = self.step(&state)? {
-                if self.driver.has_navigator() {
-                    self.plant.navigate(step.order).map_err(DriveError::Plant)?;
-                } else {
-                    self.plant.command(step.velocity).map_err(DriveError::Plant)?;
-                }
+                self.plant.command(step.velocity).map_err(DriveError::Plant)?;
                 is_news |= self.record(&step)? || missing != state.missing;
                 missing.clone_from(&state.missing);
             }
@@ -327,11 +322,7 @@ impl<P: Plant> Drop for Drive<'_, P> {
     fn drop(&mut self) {
         // On every way out, panics included. An error means that nothing can be sent anymore: then the robot stops by its own
         // timeout for commands.
-        let _ = if self.driver.has_navigator() {
-            self.plant.navigate(NavigatorOrder::Stop)
-        } else {
-            self.plant.command(DriveVelocity::ZERO)
-        };
+        let _ = self.plant.command(DriveVelocity::ZERO);
     }
 }
 

@@ -73,7 +73,6 @@ pub struct FlightChannel {
     differences: BTreeMap<(PeerId, Incarnation), ClockDifference>,
     counts: BTreeMap<&'static str, u64>,
     sent: (u64, u64),
-    sent_bytes: u64,
 }
 
 impl FlightChannel {
@@ -98,7 +97,6 @@ impl FlightChannel {
             differences: BTreeMap::new(),
             counts: BTreeMap::new(),
             sent: (0, 0),
-            sent_bytes: 0,
         }
     }
 
@@ -131,11 +129,6 @@ impl FlightChannel {
         self.sent
     }
 
-    /// Returns the number of bytes of all frames that were sent, to the recorder and of presences, too.
-    pub fn sent_bytes(&self) -> u64 {
-        self.sent_bytes
-    }
-
     /// Returns by how many seconds the clock of another party seems to be behind this one's.
     pub fn behind_s(&self, peer: PeerId) -> Option<f64> {
         let newest = self.differences.iter().rfind(|((other, _), _)| *other == peer);
@@ -150,13 +143,8 @@ impl FlightChannel {
     pub fn send(&mut self, to: &[PeerId], content: FlightContent) {
         let frame = self.frame(content);
         for &peer in to {
-            self.put(peer, &frame);
+            self.wire.send(&[peer], &frame);
         }
-    }
-
-    fn put(&mut self, to: PeerId, frame: &[u8]) {
-        self.sent_bytes += frame.len() as u64;
-        self.wire.send(&[to], frame);
     }
 
     /// Sends a message over the radio to some nodes: it may be lost, delayed or doubled.
@@ -191,7 +179,7 @@ impl FlightChannel {
 
     fn schedule(&mut self, to: PeerId, frame: Vec<u8>, delay: Duration) {
         if delay.is_zero() {
-            self.put(to, &frame);
+            self.wire.send(&[to], &frame);
         } else if self.delayed.len() < MAX_DELAYED {
             let number = self.next_number;
             self.next_number += 1;
@@ -242,8 +230,8 @@ impl FlightChannel {
             if due > now {
                 return Some(due);
             }
-            let (to, frame) = entry.remove();
-            self.put(to, &frame);
+            let waited = entry.remove();
+            self.wire.send(&[waited.0], &waited.1);
         }
         None
     }

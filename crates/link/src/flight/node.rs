@@ -15,7 +15,6 @@ use super::message::{FlightContent, FlightReport, Presence, RecallAnswer, Standi
 use super::time::{FlightTime, WallClock, wait_until};
 use crate::plant::aircraft::TrafficReport;
 use crate::protocol::{AgentPacket, NodeStatusReport};
-use crate::resource_usage::processor_time_ms;
 use crate::server::histogram::Histogram;
 use crate::wire::PeerId;
 use sidestep::kernel::network::NetworkAgent;
@@ -148,8 +147,6 @@ pub struct FlightNode<'a> {
     max_behind_s: f64,
     /// Times from the beginning of a cycle until the control of the next one is handed over.
     decision_time: Histogram,
-    /// Processor time of the process when its first cycle began.
-    processor_start_ms: Option<u64>,
 }
 
 impl<'a> FlightNode<'a> {
@@ -193,7 +190,6 @@ impl<'a> FlightNode<'a> {
             counts: BTreeMap::new(),
             max_behind_s: 0.0,
             decision_time: Histogram::default(),
-            processor_start_ms: None,
         }
     }
 
@@ -407,9 +403,6 @@ impl<'a> FlightNode<'a> {
         self.talk = None;
         self.heard.clear();
         self.status.cycle = cycle;
-        if self.processor_start_ms.is_none() {
-            self.processor_start_ms = processor_time_ms();
-        }
         let standing = self.standing();
         let control = self.own_report.take().and_then(|report| report.control);
         let report = self.parts.replica.report();
@@ -799,9 +792,6 @@ impl<'a> FlightNode<'a> {
         self.parts.board.take_events();
         let (_, bytes) = self.parts.channel.sent();
         self.status.bytes = bytes;
-        self.status.frame_bytes = self.parts.channel.sent_bytes();
-        let processor_ms = self.processor_start_ms.zip(processor_time_ms());
-        self.status.processor_ms = processor_ms.map(|(start_ms, now_ms)| now_ms - start_ms);
         self.status.activity = self.state.into();
         self.status.heard = self.heard.iter().copied().collect();
         self.status.dropped.clone_from(&status.counts);

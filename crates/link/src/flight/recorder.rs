@@ -323,8 +323,6 @@ impl<'a> FlightRecorder<'a> {
             lives: node.lives,
             packets: node.status.packets,
             bytes: node.status.bytes,
-            frame_bytes: node.status.frame_bytes,
-            processor_ms: node.status.processor_ms,
             silent_s: silent.map(|silent| silent.as_secs_f64()),
             differing: node.differing,
             counts: node.status.dropped.clone(),

@@ -4,7 +4,6 @@
 //! aircraft.rs  an aircraft
 //! frames.rs    frames in other frames, as /tf tells them
 //! model.rs     a model of an aircraft
-//! navigator.rs  a navigator of ROS 2, such as Nav2: its goals, and how they are canceled
 //! inbox.rs     the last messages of a robot, and what is wrong with others
 //! ros2.rs      a robot that is a node of ROS 2
 //! ```
@@ -13,13 +12,11 @@ pub mod aircraft;
 pub mod frames;
 pub mod inbox;
 pub mod model;
-mod navigator;
 pub mod ros2;
 
 use crate::drive::beacon::RobotBeacon;
 use sidestep::worlds::robots::drive::DriveVelocity;
 use sidestep::worlds::robots::drive::grid::Pose2;
-use sidestep::worlds::robots::drive::navigator::NavigatorOrder;
 use sidestep::worlds::robots::drive::scan::RangeScan;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -74,14 +71,6 @@ pub trait Plant {
     /// # Errors
     /// When the robot cannot be reached anymore, with the reason.
     fn command(&mut self, velocity: DriveVelocity) -> Result<(), String>;
-
-    /// Orders a navigator that moves the robot. A robot that has none does nothing.
-    ///
-    /// # Errors
-    /// When the robot cannot be reached anymore, with the reason.
-    fn navigate(&mut self, _order: NavigatorOrder) -> Result<(), String> {
-        Ok(())
-    }
 
     /// Returns the beacons of other robots that have come since the last call, as bytes. A robot that has none hears nobody.
     fn take_beacons(&mut self) -> ArrivedBeacons {

@@ -1,7 +1,6 @@
 //! A robot that is a node of ROS 2: it is measured and moved by topics.
 
 use super::inbox::{Inbox, PlantFrames};
-use super::navigator::Navigator;
 use super::{ArrivedBeacons, Plant, PlantState};
 use crate::drive::bag::DriveBag;
 use crate::drive::beacon::RobotBeacon;
@@ -16,8 +15,7 @@ use sidestep::kernel::math::{cos, sin};
 use sidestep::kernel::ports::RecordError;
 use sidestep::worlds::robots::drive::DriveVelocity;
 use sidestep::worlds::robots::drive::grid::Pose2;
-use sidestep::worlds::robots::drive::navigator::NavigatorOrder;
-use sidestep_session::fleet::{DriveTopics, NavigatorSettings};
+use sidestep_session::fleet::DriveTopics;
 use sidestep_session::ros::{RosMessage, STATIC_TF_TOPIC, TF_TOPIC};
 use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -36,10 +34,6 @@ struct SharedInbox {
     /// Beacons of other robots.
     beacons: Mutex<ArrivedBeacons>,
 }
-
-/// Time that a navigator has at the end to give up its goal, and time between two looks.
-const NAVIGATOR_TIMEOUT: Duration = Duration::from_secs(3);
-const NAVIGATOR_POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Most beacons that wait for the program; it takes them many times in a second.
 const MAX_BEACONS: usize = 4096;
@@ -93,8 +87,6 @@ pub struct PlantOptions {
     pub bag: Option<DriveBag>,
     /// The full names of the topics on which it hears other robots.
     pub peers: Vec<String>,
-    /// The navigator that moves it, if one does.
-    pub navigator: Option<NavigatorSettings>,
 }
 
 /// A robot by its topics.
@@ -112,7 +104,6 @@ pub struct Ros2Plant {
     pose: String,
     /// The time of the last pose in seconds.
     time_s: f64,
-    navigator: Option<Navigator>,
 }
 
 impl fmt::Debug for Ros2Plant {
@@ -185,8 +176,6 @@ impl Ros2Plant {
                 to.receive_beacon(bytes);
             })?;
         }
-        let navigator = options.navigator.as_ref();
-        let navigator = navigator.map(|it| Navigator::new(&node, it, &topics.map_frame));
         let beacon = node.resolve(&topics.beacon);
         let cmd_vel = node.resolve(&topics.cmd_vel);
         let pose = format!("{}/pose", node.full_name());
@@ -199,23 +188,14 @@ impl Ros2Plant {
             beacon,
             pose,
             time_s: 0.0,
-            navigator,
         })
     }
 
-    /// Leaves the network, once a navigator has given up its goal, and completes the bag.
+    /// Leaves the network, and completes the bag.
     ///
     /// # Errors
     /// When the bag cannot be written, or could not at some time before.
-    pub fn end(mut self) -> Result<(), RecordError> {
-        let until = Instant::now() + NAVIGATOR_TIMEOUT;
-        while self.navigator.as_ref().is_some_and(Navigator::is_canceling)
-            && Instant::now() < until
-            // Without a network it is in vain.
-            && self.navigate(NavigatorOrder::Stop).is_ok()
-        {
-            std::thread::sleep(NAVIGATOR_POLL_INTERVAL);
-        }
+    pub fn end(self) -> Result<(), RecordError> {
         self.node.leave();
         let bag = self.shared.bag().take();
         bag.map_or(Ok(()), DriveBag::finish)
@@ -281,17 +261,6 @@ impl Plant for Ros2Plant {
         }
         let sent = self.node.publish_as(&self.cmd_vel, &message);
         sent.map_err(|error| error.to_string())
-    }
-
-    fn navigate(&mut self, order: NavigatorOrder) -> Result<(), String> {
-        let Some(navigator) = &mut self.navigator else { return Ok(()) };
-        let sent = navigator.order(&mut self.node, order, self.time_s);
-        if let Some(message) = sent.map_err(|error| error.to_string())?
-            && let Some(bag) = &mut *self.shared.bag()
-        {
-            bag.record_message(&message);
-        }
-        Ok(())
     }
 
     fn take_beacons(&mut self) -> ArrivedBeacons {

@@ -17,14 +17,11 @@ use sidestep::worlds::robots::drive::DriveVelocity;
 use sidestep::worlds::robots::drive::controller::DriveLimits;
 use sidestep::worlds::robots::drive::driver::Driver;
 use sidestep::worlds::robots::drive::guard::GuardLimits;
-use sidestep::worlds::robots::drive::navigator::{NavigatorLimits, NavigatorOrder};
 use sidestep::worlds::robots::drive::plan_executor::PlanExecutor;
 use sidestep::worlds::robots::scenario::Compiled;
 use sidestep::worlds::robots::world::Role;
 use sidestep_session::Error;
-use sidestep_session::fleet::{
-    DriveJob, DriveSettings, LinkMessage, NavigatorSettings, RosNetwork,
-};
+use sidestep_session::fleet::{DriveJob, DriveSettings, LinkMessage, RosNetwork};
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
@@ -38,18 +35,6 @@ const TOLERANCE_RAD: f64 = 0.052;
 /// The radius of a robot, as a share of its side in the scenario, unless it is given: a disc in its boxes, and room for the
 /// tolerances.
 const RADIUS_SHARE: f64 = 0.4;
-
-/// Largest distance from the end of an action of a navigator, as a share of a box, unless it is given, and the largest that
-/// can be given: in half a box the next one begins.
-const NAVIGATOR_TOLERANCE_BOXES: f64 = 0.3;
-const MAX_NAVIGATOR_TOLERANCE_BOXES: f64 = 0.4;
-
-/// Largest angle from the heading at the end of an action of a navigator, in radians: 17 degrees, more than the quarter of a
-/// radian with which Nav2 is content.
-const NAVIGATOR_TOLERANCE_RAD: f64 = 0.3;
-
-/// The share of the time that a robot may stand on its way after which a navigator is told its goal again.
-const NAVIGATOR_RESEND_SHARE: f64 = 0.4;
 
 /// Time in seconds for which a robot may stand against its commands.
 const STALL_S: f64 = 1.5;
@@ -70,12 +55,7 @@ pub(super) fn run(job: &DriveJob, parent: &ParentMonitor) -> Result<(), Error> {
     let world = &building.world;
     let limits = drive_limits(&job.settings, world.map.box_size_m);
     let guard = guard_limits(&job.settings, side_m(world, job.robot));
-    let mut driver = Driver::of_scenario(building, &source, job.robot, limits, guard)?;
-    if let Some(navigator) = &job.navigator {
-        check_navigator(job, navigator, driver.takes_goals(), world.map.box_size_m)?;
-        driver =
-            driver.with_navigator(navigator_limits(navigator, &job.settings, world.map.box_size_m));
-    }
+    let driver = Driver::of_scenario(building, &source, job.robot, limits, guard)?;
     check_end(job, &driver)?;
     let peers = peer_topics(job, world)?;
     let beacons = beacons(job, world, &driver);
@@ -84,20 +64,10 @@ pub(super) fn run(job: &DriveJob, parent: &ParentMonitor) -> Result<(), Error> {
     let node = node.map_err(network_error)?;
     // After the network: what is wrong there leaves no file behind.
     let log = motion_log(job, world)?;
-    let options = PlantOptions {
-        takes_goals: driver.takes_goals(),
-        bag: drive_bag(job)?,
-        peers,
-        navigator: job.navigator.clone(),
-    };
+    let options = PlantOptions { takes_goals: driver.takes_goals(), bag: drive_bag(job)?, peers };
     let mut plant = Ros2Plant::start(node, &job.topics, options).map_err(network_error)?;
     // So that the topic of commands is known before the first measurement, and a robot that moves stands.
-    let told = if driver.has_navigator() {
-        plant.navigate(NavigatorOrder::Stop)
-    } else {
-        plant.command(DriveVelocity::ZERO)
-    };
-    told.map_err(|cause| drive_error(DriveError::Plant(cause)))?;
+    plant.command(DriveVelocity::ZERO).map_err(|cause| drive_error(DriveError::Plant(cause)))?;
     print_message(&LinkMessage::Listens(network.listen.clone()));
     print_message(&LinkMessage::Ros2(plant.node().graph()));
     let end = DriveEnd { actions: compiled.plan().cycles, trips: job.trips };
@@ -184,48 +154,6 @@ fn drive_limits(settings: &DriveSettings, box_m: f64) -> DriveLimits {
         tolerance_m: TOLERANCE_BOXES * box_m,
         tolerance_rad: TOLERANCE_RAD,
         stall_s: STALL_S,
-        cycle_s: settings.cycle_s,
-        action_timeout_s: settings.timeout_s,
-    }
-}
-
-/// Checks that goals that are sent to a navigator are not heard as goals, and that a robot at a goal is in its box.
-fn check_navigator(
-    job: &DriveJob,
-    navigator: &NavigatorSettings,
-    takes_goals: bool,
-    box_m: f64,
-) -> Result<(), InputError> {
-    if takes_goals && navigator.goal == job.topics.goal {
-        let cause = "the robot would hear the goals that are sent to its navigator as its own";
-        let remedy = "give another topic for its own goals, such as --goal trip_goal";
-        return Err(InputError::new(format!("--nav2-goal {}", navigator.goal), cause, remedy));
-    }
-    let largest_m = MAX_NAVIGATOR_TOLERANCE_BOXES * box_m;
-    match navigator.tolerance_m {
-        Some(tolerance_m) if tolerance_m > largest_m => {
-            let cause = format!(
-                "a robot so far from the center of its box of {box_m} m may be in another one"
-            );
-            let remedy = format!(
-                "give at most {largest_m}, and a goal checker of the navigator that is content with less"
-            );
-            Err(InputError::new(format!("--tolerance {tolerance_m}"), cause, remedy))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn navigator_limits(
-    navigator: &NavigatorSettings,
-    settings: &DriveSettings,
-    box_m: f64,
-) -> NavigatorLimits {
-    NavigatorLimits {
-        tolerance_m: navigator.tolerance_m.unwrap_or(NAVIGATOR_TOLERANCE_BOXES * box_m),
-        tolerance_rad: NAVIGATOR_TOLERANCE_RAD,
-        stall_s: navigator.stall_s,
-        resend_s: NAVIGATOR_RESEND_SHARE * navigator.stall_s,
         cycle_s: settings.cycle_s,
         action_timeout_s: settings.timeout_s,
     }

@@ -19,7 +19,6 @@ use crate::server::histogram::Histogram;
 use crate::server::{
     FleetContext, FleetError, FleetServer, NodeEntry, SILENCE_TIMEOUT, ServerConfig, ServerHooks,
 };
-use crate::stream::{FleetStream, StreamSource};
 use crate::wire::endpoint::{
     PortReservation, WireSetupError, check_reachable, reserve_port, with_port,
 };
@@ -77,12 +76,6 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
     run.note_removals(&WarningLogger);
     print_message(&LinkMessage::Listens(listen.clone()));
-    let speed = match job.clock {
-        ClockMode::Lockstep => None,
-        ClockMode::Realtime { speed } => Some(speed),
-    };
-    let source = StreamSource { speed, has_server: true };
-    let stream = start_stream(job.publish.as_deref(), run.simulation(), source)?;
     let scene = view::scene_json(&viewer_scene(run.simulation()));
     let views = ViewPublisher::new(ViewServer::start(&wire, scene).map_err(endpoint_error)?);
     let messenger = Messenger::new(PeerId::Server, Box::new(wire));
@@ -108,8 +101,7 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let mut supervisor = FleetSupervisor::new(children, parent, run_config.cycles, exporter, views);
     supervisor.denials = DenialLog::new(credentials.as_ref());
     supervisor.packets = create_packet_table(job, &scenario.source.text, run_config.seed)?;
-    let run = HostedRun::new(run, scenario.world, &WarningLogger);
-    let mut run = observed_by(run, stream);
+    let mut run = HostedRun::new(run, scenario.world, &WarningLogger);
     let (result, _) = FleetServer::new(messenger, &mut run, &mut supervisor, config).run();
     supervisor.children.shut_down();
     let result = result.and_then(|()| supervisor.finish_packets());
@@ -117,29 +109,6 @@ pub(super) fn run(job: &FleetJob, parent: &ParentMonitor) -> Result<(), Error> {
     let finished = finish(run.into_managed_run(), result, status, job.clock);
     views.wait_for_viewers();
     finished
-}
-
-/// Publishes a run at an endpoint, if one is given, and says where.
-///
-/// # Errors
-/// When it cannot be bound.
-pub(super) fn start_stream(
-    endpoint: Option<&str>,
-    run: &dyn Simulation,
-    source: StreamSource,
-) -> Result<Option<FleetStream>, Error> {
-    let Some(endpoint) = endpoint else { return Ok(None) };
-    let stream = FleetStream::start(endpoint, run, source).map_err(endpoint_error)?;
-    print_message(&LinkMessage::Publishes(stream.endpoint().into()));
-    Ok(Some(stream))
-}
-
-/// Returns a run that a stream observes, if there is one.
-pub(super) fn observed_by(run: HostedRun, stream: Option<FleetStream>) -> HostedRun {
-    match stream {
-        Some(stream) => run.with_observer(Box::new(stream)),
-        None => run,
-    }
 }
 
 /// Returns the group of all nodes, where they have one.

@@ -2,7 +2,6 @@
 
 use super::certificates::{check_identity, check_names, credentials};
 use super::mavlink::MavlinkJob;
-use super::metrics::{MetricsExporter, flight_metrics};
 use super::node::endpoint_error;
 use super::output::print_message;
 use super::parent_monitor::ParentMonitor;
@@ -113,7 +112,6 @@ pub(super) fn run(job: &FlightJob, parent: &ParentMonitor) -> Result<(), Error> 
     let compiled = flown.airspace()?;
     let world = &compiled.world;
     let limits = guard_limits(job, world, agent)?;
-    let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
     let plant = open_plant(job, world, agent, parent)?;
     let listen = listen_endpoints(&job.network.listen)?;
     let options =
@@ -150,7 +148,6 @@ pub(super) fn run(job: &FlightJob, parent: &ParentMonitor) -> Result<(), Error> 
     let guard = Guard::new(plant, board, clock, limits);
     let has_to_end = || parent.has_ended();
     let node = FlightNode::new(agent, parts, settings, &has_to_end, |status| {
-        exporter.replace_text(|| flight_metrics(&job.agent, status));
         print_message(&LinkMessage::Flight(status.clone()));
     });
     let flown = with_guard(guard, node);

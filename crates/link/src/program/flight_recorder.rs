@@ -2,9 +2,8 @@
 
 use super::certificates::{check_identity, credentials};
 use super::children::NodeProcesses;
-use super::fleet::{WarningLogger, observed_by, start_stream};
+use super::fleet::WarningLogger;
 use super::flight::{FlightScenario, listen_endpoints};
-use super::metrics::{MetricsExporter, recorder_metrics};
 use super::node::endpoint_error;
 use super::output::print_message;
 use super::parent_monitor::ParentMonitor;
@@ -14,7 +13,6 @@ use crate::flight::recorder::{FlightRecorder, RecorderHooks};
 use crate::flight::time::{FlightTime, WallClock};
 use crate::hosted_run::HostedRun;
 use crate::identity::{CertificateName, SERVER_NAME};
-use crate::stream::StreamSource;
 use crate::wire::PeerId;
 use crate::wire::endpoint::{PortReservation, reserve_port, with_port};
 use crate::wire::zenoh::{PeerOptions, ZenohWire};
@@ -55,9 +53,6 @@ pub(super) fn run(job: &FlightRecorderJob, parent: &ParentMonitor) -> Result<(),
     };
     let run = ManagedRun::start(&WORLDS, scenario.compiled.as_ref(), &scenario.source, 1, paths)?;
     run.note_removals(&WarningLogger);
-    let exporter = MetricsExporter::serve_at(job.common.metrics.as_deref())?;
-    let source = StreamSource { speed: Some(job.clock.speed), has_server: false };
-    let stream = start_stream(job.publish.as_deref(), run.simulation(), source)?;
     // Nodes bind their ports themselves.
     drop(ports);
     // It is removed with the flight's end.
@@ -85,8 +80,8 @@ pub(super) fn run(job: &FlightRecorderJob, parent: &ParentMonitor) -> Result<(),
         speed: job.clock.speed,
         dt_s: world.cycle_s(),
     };
-    let mut supervisor = FlightSupervisor { children, parent, exporter };
-    let hosted = observed_by(HostedRun::new(run, world, &WarningLogger), stream);
+    let mut supervisor = FlightSupervisor { children, parent };
+    let hosted = HostedRun::new(run, world, &WarningLogger);
     let recorder = FlightRecorder::new(channel, hosted, time, &mut supervisor);
     let mut recorder = recorder.with_run_up(job.guard.run_up_s);
     let listened = recorder.listen();
@@ -157,7 +152,6 @@ fn node_jobs(
 struct FlightSupervisor<'a> {
     children: NodeProcesses,
     parent: &'a ParentMonitor,
-    exporter: MetricsExporter,
 }
 
 impl RecorderHooks for FlightSupervisor<'_> {
@@ -184,7 +178,6 @@ impl RecorderHooks for FlightSupervisor<'_> {
     }
 
     fn report(&mut self, status: &FleetStatus) {
-        self.exporter.replace_text(|| recorder_metrics(status));
         print_message(&LinkMessage::Fleet(status.clone()));
     }
 }

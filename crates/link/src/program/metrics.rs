@@ -7,7 +7,7 @@ use crate::wire::access::denied_total;
 use crate::wire::endpoint::parse_port;
 use crate::wire::http_text::serve_http_text;
 use sidestep::kernel::InputError;
-use sidestep_session::fleet::{AgentName, FleetStatus, FlightStatus, NodeStatus};
+use sidestep_session::fleet::{AgentName, FleetStatus, NodeStatus};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -216,86 +216,27 @@ const NODE_METRICS: [NodeMetric; 9] = [
 ];
 
 fn push_node_metrics(text: &mut MetricsText, status: &FleetStatus, fleet: &FleetContext<'_>) {
-    push_node_statuses(text, status);
+    for NodeMetric { name, kind, help, value } in &NODE_METRICS {
+        let values =
+            status.nodes.iter().map(|node| (format_label(&status.noun, &node.name), value(node)));
+        text.push_per_agent(name, kind, help, values);
+    }
     let statuses = status.nodes.iter().filter_map(|node| {
         let entry = fleet.nodes.get(&node.agent)?;
         Some((format_label(&status.noun, &node.name), &entry.status))
     });
     push_messenger_metrics(text, &statuses.collect::<Vec<_>>());
-}
-
-/// Adds what the status of a fleet says of its nodes.
-fn push_node_statuses(text: &mut MetricsText, status: &FleetStatus) {
-    let label = |node: &NodeStatus| format_label(&status.noun, &node.name);
-    for NodeMetric { name, kind, help, value } in &NODE_METRICS {
-        let values = status.nodes.iter().map(|node| (label(node), value(node)));
-        text.push_per_agent(name, kind, help, values);
-    }
     // Some systems do not tell it.
-    let processor_times = status
-        .nodes
-        .iter()
-        .filter_map(|node| Some((label(node), 1e-3 * node.processor_ms? as f64)));
+    let processor_times = status.nodes.iter().filter_map(|node| {
+        let processor_s = 1e-3 * node.processor_ms? as f64;
+        Some((format_label(&status.noun, &node.name), processor_s))
+    });
     text.push_per_agent(
         "node_processor_seconds_total",
         "counter",
         "Processor time that a node has used since its first cycle.",
         processor_times,
     );
-}
-
-/// Returns the metrics that the address of a recorder serves.
-pub(super) fn recorder_metrics(status: &FleetStatus) -> String {
-    let mut text = MetricsText::default();
-    text.push_header("cycle", "gauge", "Cycles done.");
-    text.push_sample("cycle", "", status.cycle);
-    push_node_statuses(&mut text, status);
-    let label = |node: &NodeStatus| format_label(&status.noun, &node.name);
-    text.push_per_agent(
-        "reports_differing_total",
-        "counter",
-        "Reports of a node that differ from what is recorded.",
-        status.nodes.iter().map(|node| (label(node), node.differing as f64)),
-    );
-    push_counts(&mut text, status.nodes.iter().map(|node| (label(node), &*node.counts)));
-    text.0
-}
-
-/// Returns the metrics that the own address of a node without a server serves.
-pub(super) fn flight_metrics(agent: &AgentName, status: &FlightStatus) -> String {
-    let mut text = MetricsText::default();
-    let agent = format_label(&agent.noun, &agent.to_string());
-    text.push_header("node_cycle", "gauge", "The cycle that a node is in.");
-    text.push_sample("node_cycle", &agent, status.cycle as f64);
-    let is_held = status.state == "held";
-    text.push_header("node_held", "gauge", "Whether a guard has handed the aircraft over.");
-    text.push_sample("node_held", &agent, u8::from(is_held));
-    text.push_header(
-        "deviation_meters",
-        "gauge",
-        "Distance of the aircraft from its reference at the last measurement.",
-    );
-    if let Some(deviation_m) = status.deviation_m {
-        text.push_sample("deviation_meters", &agent, deviation_m);
-    }
-    text.push_header("max_deviation_meters", "gauge", "The largest such distance so far.");
-    text.push_sample("max_deviation_meters", &agent, status.max_deviation_m);
-    push_counts(&mut text, [(agent, &*status.counts)].into_iter());
-    text.0
-}
-
-/// Adds what nodes without a server have counted, by the labels of their agents.
-fn push_counts<'a>(
-    text: &mut MetricsText,
-    counts: impl Iterator<Item = (String, &'a [(String, u64)])>,
-) {
-    text.push_header("counted", "gauge", "What a node has counted, or measured, by name.");
-    for (agent, counts) in counts {
-        for (name, count) in counts {
-            let labels = format!("{agent},{}", format_label("name", name));
-            text.push_sample("counted", &labels, count);
-        }
-    }
 }
 
 /// Returns a label with its value between quotes, where a quote, a backslash and the end of a line are escaped.

@@ -109,7 +109,6 @@ fn run_job(job: Job) -> Result<(), Error> {
     match job {
         Job::Fleet(job) => {
             apply_common_settings(&job.common, &job.listen)?;
-            certificates::check_links(&job.publish, None, job.common.is_insecure)?;
             fleet::run(&job, &ParentMonitor::watch())
         }
         Job::Node(job) => {
@@ -151,7 +150,6 @@ fn run_job(job: Job) -> Result<(), Error> {
         }
         Job::FlightRecorder(job) => {
             check_flight_network(&job.common, &job.network)?;
-            certificates::check_links(&job.publish, None, job.common.is_insecure)?;
             flight_recorder::run(&job, &ParentMonitor::watch())
         }
     }
@@ -160,6 +158,11 @@ fn run_job(job: Job) -> Result<(), Error> {
 /// Checks the options of a party of a flight without a server, and starts its log.
 fn check_flight_network(common: &CommonSettings, network: &FlightNetwork) -> Result<(), Error> {
     apply_common_settings(common, network.listen.iter().chain(&network.peers))?;
+    if let Some(address) = &common.metrics {
+        let cause = "a flight without a server serves no metrics";
+        let remedy = "leave it out; --json tells what was counted";
+        return Err(InputError::new(format!("--metrics {address}"), cause, remedy).into());
+    }
     if network.is_scouting && common.tls.is_none() && !common.is_insecure {
         let cause = "whoever is on this network would be found, and could take part";
         let remedy = "give --tls-ca, --tls-cert and --tls-key, or --insecure on a network that you trust; without \

@@ -24,7 +24,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
-use zenoh::query::{Query, QueryTarget, Queryable, ReplyKeyExpr};
+use zenoh::query::{Query, Queryable, ReplyKeyExpr};
 use zenoh::{Session, Wait};
 
 /// The name of the node of a run.
@@ -157,24 +157,11 @@ struct Server {
     _token: LivelinessToken,
 }
 
-/// A client of a service.
-struct Client {
-    key: KeyExpr<'static>,
-    gid: Gid,
-    /// Number of requests sent.
-    sent: i64,
-    _token: LivelinessToken,
-}
-
-/// Time after which the answer to a request is given up.
-const RESPONSE_TIMEOUT: Duration = Duration::from_secs(2);
-
 /// A node of ROS 2.
 pub struct RosNode {
     name: RosNodeName,
     publishers: BTreeMap<String, Publisher>,
     servers: Vec<Server>,
-    clients: BTreeMap<String, Client>,
     subscriptions: Vec<Subscription>,
     /// Number of topics and services that have had a token.
     endpoints: u32,
@@ -236,7 +223,6 @@ impl RosNode {
             name,
             publishers: BTreeMap::new(),
             servers: Vec::new(),
-            clients: BTreeMap::new(),
             subscriptions: Vec::new(),
             endpoints: 0,
             inputs,
@@ -348,57 +334,6 @@ impl RosNode {
         put.wait().map_err(|error| closed_session(&*error))
     }
 
-    /// Sends a request to a service by its full name, and calls `on_response` with the bytes of each answer. The first one
-    /// makes the client known. Without a server there is no answer.
-    ///
-    /// # Errors
-    /// When the session is closed.
-    pub fn request(
-        &mut self,
-        service: &str,
-        ros_type: RosType,
-        bytes: Vec<u8>,
-        on_response: impl Fn(&[u8]) + Send + Sync + 'static,
-    ) -> Result<(), WireSetupError> {
-        if !self.clients.contains_key(service) {
-            let client = self.declare_client(service, ros_type)?;
-            self.clients.insert(service.into(), client);
-        }
-        let Some(client) = self.clients.get_mut(service) else { return Ok(()) };
-        client.sent += 1;
-        let attachment = Attachment {
-            sequence_number: client.sent,
-            source_time_ns: wall_clock_ns(),
-            gid: client.gid,
-        };
-        let query = self.session.get(&client.key).payload(bytes).attachment(attachment.to_bytes());
-        // A server of ROS answers everything on its key.
-        let query = query.target(QueryTarget::AllComplete).timeout(RESPONSE_TIMEOUT);
-        let sent = query.callback(move |reply| {
-            if let Ok(sample) = reply.result() {
-                on_response(&sample.payload().to_bytes());
-            }
-        });
-        sent.wait().map_err(|error| closed_session(&*error))
-    }
-
-    fn declare_client(
-        &mut self,
-        service: &str,
-        ros_type: RosType,
-    ) -> Result<Client, WireSetupError> {
-        let endpoint = RosEndpoint {
-            kind: EndpointKind::Client,
-            name: service.into(),
-            ros_type,
-            quality: QualityOfService::DEFAULT,
-        };
-        let token = self.next_token(&endpoint);
-        let key = KeyExpr::try_from(self.name.data_key(&endpoint)).map_err(|e| bad_key(&*e))?;
-        let gid = gid_of_token(&token);
-        Ok(Client { key, gid, sent: 0, _token: declare_token(&self.session, token)? })
-    }
-
     /// Hears velocities for a robot from now on.
     ///
     /// # Errors
@@ -469,10 +404,9 @@ impl RosNode {
 
     /// Leaves the network: the others see that the node and all that it had is gone.
     pub fn leave(self) {
-        let Self { publishers, servers, clients, subscriptions, session, .. } = self;
+        let Self { publishers, servers, subscriptions, session, .. } = self;
         drop(publishers);
         drop(servers);
-        drop(clients);
         drop(subscriptions);
         // An error means that it is closed already.
         let _ = session.close().wait();

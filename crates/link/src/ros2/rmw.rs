@@ -84,8 +84,6 @@ pub enum EndpointKind {
     Subscription,
     /// The server of a service.
     Service,
-    /// A client of a service.
-    Client,
 }
 
 impl EndpointKind {
@@ -94,7 +92,6 @@ impl EndpointKind {
             Self::Publisher => "MP",
             Self::Subscription => "MS",
             Self::Service => "SS",
-            Self::Client => "SC",
         }
     }
 }

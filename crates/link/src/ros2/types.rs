@@ -66,12 +66,6 @@ pub const TRIGGER: RosType = RosType {
     hash: "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
 };
 
-/// Asks an action to give up its goals.
-pub const CANCEL_GOAL: RosType = RosType {
-    name: "action_msgs/srv/CancelGoal",
-    hash: "RIHS01_573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a",
-};
-
 /// The type of a velocity that a robot is to have.
 pub const TWIST_NAME: &str = "geometry_msgs/msg/Twist";
 

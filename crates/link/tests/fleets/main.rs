@@ -17,7 +17,6 @@ mod relay;
 mod robot_soak;
 mod robots;
 mod soak;
-mod stream;
 mod support;
 mod threads;
 mod tls;

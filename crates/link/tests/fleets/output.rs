@@ -2,13 +2,10 @@
 
 use crate::processes::{LinkProcess, folder, job};
 use crate::support::{superconflict, wide};
-use crate::vehicles::listens;
-use crate::without_server::{recorder, ring};
 use serde_json::Value;
 use sidestep_link::wire::endpoint::reserve_port;
 use sidestep_session::fleet::{
-    AgentName, ClockMode, CommonSettings, FleetJob, FlightJob, FlightNetwork, FlightRecorderJob,
-    Job, LinkMessage, NodeJob, Topology,
+    AgentName, ClockMode, FleetJob, Job, LinkMessage, NodeJob, Topology,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{Read, Write};
@@ -138,7 +135,8 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
         LinkMessage::Listens(endpoints) => Some(endpoints),
         _ => None,
     });
-    let common = CommonSettings { metrics: Some(at_node.clone()), ..common };
+    let common =
+        sidestep_session::fleet::CommonSettings { metrics: Some(at_node.clone()), ..common };
     let (agent, listen, patience_s) = (AgentName::new("airplane", 2, None), Vec::new(), 30.0);
     let _node =
         LinkProcess::start(&Job::Node(NodeJob { common, agent, connect, listen, patience_s }));
@@ -179,52 +177,6 @@ fn metrics_of_the_server_and_of_a_node_are_prometheus_text_of_what_happens() {
         assert!(Instant::now() < until, "{text}");
     }
     assert_eq!(ask(&at_node, "POST").0, "HTTP/1.1 405 Method Not Allowed");
-}
-
-#[test]
-fn metrics_of_a_recorder_and_of_a_node_without_a_server_are_those_of_a_flight() {
-    let folder = folder(&ring(3, 30, ""));
-    let [at_recorder, at_node] = free_addresses();
-    let job = recorder(folder.path());
-    let at =
-        |address: &String| CommonSettings { metrics: Some(address.clone()), ..job.common.clone() };
-    let any_port = vec!["tcp/127.0.0.1:0".to_string()];
-    let node = LinkProcess::start(&Job::Flight(Box::new(FlightJob {
-        common: at(&at_node),
-        agent: AgentName::new("airplane", 2, None),
-        clock: job.clock,
-        network: FlightNetwork { listen: any_port, ..job.network.clone() },
-        plant: job.plant.clone(),
-        guard: job.guard.clone(),
-        journal: None,
-    })));
-    let network = FlightNetwork { peers: vec![listens(&node)], ..job.network.clone() };
-    let common = at(&at_recorder);
-    let flown = FlightRecorderJob { common, nodes: Some(2), network, ..job.clone() };
-    let program = LinkProcess::start(&Job::FlightRecorder(Box::new(flown)));
-    let now = program.fleet("some cycles", |now| now.cycle >= 5);
-    let tells = families(&ask(&at_recorder, "GET").1);
-    let value = |name: &str, labels: &[(&str, &str)]| {
-        tells[&format!("sidestep_{name}")].value(labels).expect("a value")
-    };
-    assert!(value("cycle", &[]) >= now.cycle as f64);
-    for airplane in ["0", "1", "2"] {
-        let label = [("airplane", airplane)];
-        assert_eq!(value("node_up", &label), 1.0);
-        assert!(value("controls_flown_total", &label) >= 4.0);
-        assert!(value("node_frame_bytes_total", &label) > value("packet_bytes_total", &label));
-        assert_eq!(value("reports_differing_total", &label), 0.0);
-        assert!(value("node_processor_seconds_total", &label) >= 0.0);
-        let within = [("airplane", airplane), ("name", "decision-p99-ms")];
-        assert!(value("counted", &within) > 0.0);
-    }
-    let tells = families(&ask(&at_node, "GET").1);
-    let own = |name: &str| tells[&format!("sidestep_{name}")].value(&[("airplane", "2")]);
-    assert!(own("node_cycle").expect("a value") >= 4.0);
-    assert_eq!(own("node_held"), Some(0.0));
-    assert!(own("max_deviation_meters") >= own("deviation_meters"));
-    program.complete();
-    assert_eq!(node.end().0, Some(0));
 }
 
 /// Returns the lines of a fleet's log as JSON, once something holds for one of them.

@@ -48,7 +48,6 @@ pub(crate) fn job(folder: &Path, topology: Topology, clock: ClockMode) -> FleetJ
         out: None,
         replace: false,
         packets: false,
-        publish: None,
     }
 }
 

@@ -53,7 +53,6 @@ pub(crate) fn recorder(folder: &Path) -> FlightRecorderJob {
         guard: guard(),
         out: Some(folder.join("run")),
         replace: false,
-        publish: None,
     }
 }
 

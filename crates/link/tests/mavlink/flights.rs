@@ -201,7 +201,6 @@ impl Flight {
             guard: guard.clone(),
             out: Some(folder.join("run")),
             replace: false,
-            publish: None,
         };
         let recorder = start(&Job::FlightRecorder(Box::new(job)));
         Self { vehicles, nodes, endpoints: peers, recorder }

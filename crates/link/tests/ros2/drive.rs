@@ -4,8 +4,8 @@ use crate::PEER;
 use crate::process::{TEST_TIMEOUT, common_settings};
 use serde_json::{Value, json};
 use sidestep_session::fleet::{
-    DriveJob, DriveSettings, DriveStatus, DriveTopics, Job, JobError, LinkMessage,
-    NavigatorSettings, RosDistribution, RosGraph, RosNetwork, link_command,
+    DriveJob, DriveSettings, DriveStatus, DriveTopics, Job, JobError, LinkMessage, RosDistribution,
+    RosGraph, RosNetwork, link_command,
 };
 use sidestep_testing::{has_modules, python};
 use std::io::{BufRead, BufReader, Write};
@@ -206,11 +206,6 @@ impl DriveProcess {
         self.child.wait().expect("it ends");
     }
 
-    /// Waits until its process has ended, and returns whether that was well.
-    fn wait(&mut self) -> bool {
-        self.child.wait().expect("it ends").success()
-    }
-
     /// Asks it to end, as Ctrl-C does, and returns how it was.
     pub(crate) fn interrupt(&mut self) -> DriveStatus {
         drop(self.stdin.take());
@@ -259,7 +254,6 @@ pub(crate) fn job(file: &Path, robot: u32, port: u16) -> DriveJob {
             beacon_patience_s: 5.0,
             timeout_s: 60.0,
         },
-        navigator: None,
         trips: Some(1),
         out: None,
         bag: None,
@@ -466,92 +460,4 @@ fn read_bag(folder: &Path) -> Value {
     let output = Command::new(python()).arg(script).arg(folder).output().expect("python starts");
     let error = String::from_utf8_lossy(&output.stderr);
     serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {error}"))
-}
-
-/// Returns the job of a robot that a navigator moves.
-fn navigated_job(file: &Path, robot: u32, port: u16) -> DriveJob {
-    let navigator = NavigatorSettings {
-        goal: "goal_pose".into(),
-        action: "navigate_to_pose".into(),
-        tolerance_m: None,
-        stall_s: 6.0,
-    };
-    let navigator = Some(navigator);
-    let mut job = DriveJob { navigator, ..job(file, robot, port) };
-    job.topics.goal = "trip_goal".into();
-    job
-}
-
-#[test]
-fn a_navigator_moves_a_robot_from_box_to_box_and_is_asked_to_stop_when_measurements_do() {
-    if !has_modules(PEER) {
-        return;
-    }
-    let robots = [([0, 0, 0], [10, 6])];
-    let folder = ScenarioFolder::new(&scenario(&robots));
-    let more = json!({ "navigator": true, "pace": 4.0 });
-    let mut plants = Plants::start_with(&[robots[0].0], more);
-    let out = folder.path("motions.csv");
-    let job = navigated_job(&folder.path("s.toml"), 0, plants.port);
-    let mut drive = DriveProcess::start(DriveJob { out: Some(out.clone()), ..job });
-    drive.wait_for(|status| status.actions >= 3);
-    // Its goal was taken from it, so that it stands: the navigator does not see that nothing is measured.
-    assert_eq!(plants.ask("silence")["velocities"], json!([[0.0, 0.0]]));
-    let silent = plants.ask("report")[0].clone();
-    assert!(silent["has_goal"] == false && silent["cancels"].as_u64() >= Some(1), "{silent}");
-    plants.ask("speak");
-    let end = drive.end();
-    assert_eq!((end.trips, end.contacts, end.timeouts), (1, 0, 0), "{end:?}");
-    assert!(end.old_states >= 1, "{end:?}");
-    assert!(drive.wait(), "it ends well");
-    let report = plants.ask("report")[0].clone();
-    assert!(is_at(&report, [10, 6]), "{report}");
-    assert_eq!((&report["touches"], &report["has_goal"]), (&json!(0), &json!(false)), "{report}");
-    assert_eq!(report["commands"], 0, "no velocities are sent: {report}");
-    assert!(report["goals"].as_u64() >= Some(end.actions), "{report}");
-    let table = std::fs::read_to_string(out).expect("a table");
-    assert_eq!(table.lines().count() as u64, 1 + end.actions, "{table}");
-}
-
-#[test]
-fn what_a_navigator_cannot_pass_is_a_contact_and_a_drive_that_ends_takes_its_goal_back() {
-    if !has_modules(PEER) {
-        return;
-    }
-    let robots = [([0, 5, 0], [6, 5])];
-    let text = scenario(&robots).replace("avoidance = \"plan\"", "avoidance = \"touch\"");
-    let folder = ScenarioFolder::new(&text);
-    // A wall across the hall that its map does not have: there is no way.
-    let walls: Vec<[u32; 2]> = (0..8).map(|row| [3, row]).collect();
-    let more = json!({ "navigator": true, "pace": 4.0, "walls": walls });
-    let mut plants = Plants::start_with(&[robots[0].0], more);
-    let mut drive = DriveProcess::start(navigated_job(&folder.path("s.toml"), 0, plants.port));
-    let blocked = drive.wait_for(|status| status.contacts >= 2);
-    assert_eq!(blocked.timeouts, 0, "{blocked:?}");
-    let at = blocked.at.expect("it has moved");
-    assert!(at.0 <= 2, "{blocked:?}");
-    // It is on its way back or ahead again.
-    let until = drive.wait_for(|status| status.actions > blocked.actions);
-    assert_eq!(until.trips, 0);
-    drive.interrupt();
-    assert!(!drive.wait(), "it was interrupted");
-    let report = plants.ask("report")[0].clone();
-    assert_eq!(report["has_goal"], false, "{report}");
-}
-
-#[test]
-fn a_robot_does_not_take_the_goals_of_its_navigator_for_its_own_nor_a_tolerance_of_half_a_box() {
-    let folder = ScenarioFolder::new(
-        &scenario(&[([0, 0, 0], [10, 6])])
-            .replace("\"goto\", goals = [[10, 6]], avoidance = \"plan\"", "\"external\""),
-    );
-    let same = navigated_job(&folder.path("s.toml"), 0, 9);
-    let mut same = DriveJob { trips: None, ..same };
-    same.topics.goal = "goal_pose".into();
-    let failed = DriveProcess::start(same).failure();
-    assert!(failed.is_input && failed.remedy.contains("--goal trip_goal"), "{failed:?}");
-    let mut wide = navigated_job(&folder.path("s.toml"), 0, 9);
-    wide.navigator.as_mut().expect("it is there").tolerance_m = Some(0.25);
-    let failed = DriveProcess::start(wide).failure();
-    assert!(failed.cause.contains("another one") && failed.remedy.contains("0.2"), "{failed:?}");
 }

@@ -8,8 +8,7 @@ CONFIG is a JSON object: `port`, at which the router listens; `domain`; `map`, r
 robots does not have, by column and row; `stamped`, whether commands are TwistStamped; `rays` of a laser; `drift_m`, the standard
 deviation of what localization is off, which changes within a quarter of a minute; `pace`, seconds of the robots in a second at most;
 `goals`, whether goals can be sent; `beacon`, the definition of RobotBeacon, whose topics are heard; `stop_after`, steps without a
-command after which a base stops; `navigator`, whether each robot has a navigator as Nav2 is one: it takes goals, finds its
-way to them in a straight line, and can be asked to give them up. Wheels slip, lasers and localization are noisy. Lines on standard input:
+command after which a base stops. Wheels slip, lasers and localization are noisy. Lines on standard input:
 
     silence   stop sending measurements; answers when the last command of each robot is zero
     speak     send them again
@@ -19,7 +18,6 @@ way to them in a straight line, and can be asked to give them up. Wheels slip, l
     end       end
 """
 
-import hashlib
 import json
 import math
 import sys
@@ -29,7 +27,7 @@ import time
 import numpy as np
 import zenoh
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceServer, ROS2Subscriber, ZenohSession
+from zenoh_ros2_sdk import ROS2Publisher, ROS2Subscriber, ZenohSession
 
 CONFIG = json.loads(sys.argv[1])
 PORT = CONFIG["port"]
@@ -53,7 +51,6 @@ TYPES = get_typestore(Stores.ROS2_JAZZY)
 BEACON = "sidestep_msgs/msg/RobotBeacon"
 if "beacon" in CONFIG:
     TYPES.register(get_types_from_msg(CONFIG["beacon"], BEACON))
-CANCEL_GOAL = "action_msgs/srv/CancelGoal"
 STOP_AFTER = CONFIG.get("stop_after")
 RANDOM = np.random.default_rng(7)
 
@@ -84,114 +81,6 @@ def squares():
 SQUARES = squares()
 
 
-def rihs01(name, fields, referenced):
-    """The hash of a type by REP 2011."""
-
-    def description(name, fields):
-        keys = ("type_id", "capacity", "string_capacity", "nested_type_name")
-        own = [{"name": field, "type": dict(zip(keys, kind, strict=True))} for field, kind in fields]
-        return {"type_name": name, "fields": own}
-
-    others = [description(*other) for other in sorted(referenced)]
-    text = json.dumps({"type_description": description(name, fields), "referenced_type_descriptions": others})
-    return "RIHS01_" + hashlib.sha256(text.encode()).hexdigest()
-
-
-def cancel_goal_hash():
-    """The hash of action_msgs/srv/CancelGoal, of whose nested types the package knows nothing."""
-
-    def nested(name, kind=1, capacity=0):
-        return (kind, capacity, 0, name)
-
-    # The numbers of type_description_interfaces/msg/FieldType.
-    number = {"int8": (2, 0, 0, ""), "uint8": (3, 0, 0, ""), "int32": (6, 0, 0, ""), "uint32": (7, 0, 0, "")}
-    number |= {"int64": (8, 0, 0, ""), "uint8[16]": (51, 16, 0, "")}
-    bounded, unbounded = 97, 145
-    time, goal = nested("builtin_interfaces/msg/Time"), "action_msgs/msg/GoalInfo"
-    parts = [("info", nested("service_msgs/msg/ServiceEventInfo"))]
-    parts += [(part.lower(), nested(f"{CANCEL_GOAL}_{part}", bounded, 1)) for part in ("Request", "Response")]
-    info = [("event_type", number["uint8"]), ("stamp", time), ("client_gid", number["uint8[16]"])]
-    referenced = [
-        (goal, [("goal_id", nested("unique_identifier_msgs/msg/UUID")), ("stamp", time)]),
-        ("unique_identifier_msgs/msg/UUID", [("uuid", number["uint8[16]"])]),
-        ("builtin_interfaces/msg/Time", [("sec", number["int32"]), ("nanosec", number["uint32"])]),
-        (f"{CANCEL_GOAL}_Request", [("goal_info", nested(goal))]),
-        (f"{CANCEL_GOAL}_Response", [("return_code", number["int8"]), ("goals_canceling", nested(goal, unbounded))]),
-        (f"{CANCEL_GOAL}_Event", parts),
-        ("service_msgs/msg/ServiceEventInfo", [*info, ("sequence_number", number["int64"])]),
-    ]
-    messages = ("Request", "Response", "Event")
-    fields = [(f"{part.lower()}_message", nested(f"{CANCEL_GOAL}_{part}")) for part in messages]
-    return rihs01(CANCEL_GOAL, fields, referenced)
-
-
-class Navigator:
-    """A navigator: it turns to its goal, goes there, and turns to the heading of the goal."""
-
-    def __init__(self, name):
-        self.goal = None
-        self.goals = 0
-        self.cancels = 0
-        self.waits = 0
-        self.blocked = 0
-        self.heard = topic(ROS2Subscriber, f"/{name}/goal_pose", "geometry_msgs/msg/PoseStamped", self.on_goal)
-        self.server = ROS2ServiceServer(
-            f"/{name}/navigate_to_pose/_action/cancel_goal",
-            CANCEL_GOAL,
-            self.on_cancel,
-            # The same bytes without nested types, of which the package finds none by itself.
-            request_definition="uint8[16] goal_id\nint32 sec\nuint32 nanosec",
-            response_definition="int8 return_code\nuint8[] goals_canceling",
-            type_hash=cancel_goal_hash(),
-            **AT,
-        )
-        self.response = self.server.response_msg_class
-
-    def on_goal(self, message):
-        at, turn = message.pose.position, message.pose.orientation
-        self.goal = (at.x, at.y, 2 * math.atan2(turn.z, turn.w))
-        self.goals += 1
-        # It plans for some time.
-        self.waits = 6
-        self.blocked = 0
-
-    def on_cancel(self, request):
-        # Of all goals, whenever they were accepted.
-        assert not any(request.goal_id) and (request.sec, request.nanosec) == (0, 0)
-        self.cancels += 1
-        code = 1 if self.goal is None else 0
-        self.goal = None
-        return self.response(return_code=code, goals_canceling=np.array([], dtype=np.uint8))
-
-    def velocity(self, at, yaw, is_touching):
-        """The velocity by which it moves its robot."""
-        self.blocked = self.blocked + 1 if is_touching else 0
-        if self.blocked > 20:
-            # It gives up.
-            self.goal = None
-        if self.goal is None or self.waits > 0:
-            self.waits -= 1
-            return 0.0, 0.0
-        x, y, heading = self.goal
-        off = math.hypot(x - at[0], y - at[1])
-        if off > 0.06:
-            turn = wrap(math.atan2(y - at[1], x - at[0]) - yaw)
-            return (min(0.4, 1.5 * off) if abs(turn) < 0.3 else 0.0), clip(2.5 * turn)
-        turn = wrap(heading - yaw)
-        if abs(turn) < 0.06:
-            self.goal = None
-            return 0.0, 0.0
-        return 0.0, clip(2.5 * turn)
-
-
-def wrap(angle):
-    return (angle + math.pi) % (2 * math.pi) - math.pi
-
-
-def clip(rate):
-    return math.copysign(min(1.2, max(0.1, abs(rate))), rate)
-
-
 class Robot:
     """One robot: its true pose, and its topics."""
 
@@ -212,7 +101,6 @@ class Robot:
         self.track = []
         self.steps_alone = 0
         self.beacon = None
-        self.navigator = Navigator(self.name) if CONFIG.get("navigator") else None
         if "beacon" in CONFIG:
             self.told = topic(ROS2Subscriber, f"/{self.name}/beacon", BEACON, self.on_beacon)
         self.odom = topic(ROS2Publisher, f"/{self.name}/odom", "nav_msgs/msg/Odometry")
@@ -239,7 +127,7 @@ class Robot:
         self.commands += 1
 
     def is_answered(self):
-        return self.navigator or self.velocity == (0.0, 0.0) or self.commands > self.commands_before
+        return self.velocity == (0.0, 0.0) or self.commands > self.commands_before
 
     def advance(self, others):
         self.steps_alone = 0 if self.commands > self.commands_before else self.steps_alone + 1
@@ -247,8 +135,6 @@ class Robot:
             self.velocity = (0.0, 0.0)
             self.timeouts += 1
         self.commands_before = self.commands
-        if self.navigator:
-            self.velocity = self.navigator.velocity(self.at + self.drift, self.yaw, self.is_touching)
         speed, rate = self.velocity
         slip = 1.0 - RANDOM.uniform(0.0, 0.2, 2)
         self.yaw += rate * slip[1] * STEP_S
@@ -433,9 +319,6 @@ class Plant:
                 "commands": robot.commands,
                 "timeouts": robot.timeouts,
                 "beacon": robot.beacon,
-                "goals": robot.navigator.goals if robot.navigator else None,
-                "cancels": robot.navigator.cancels if robot.navigator else None,
-                "has_goal": bool(robot.navigator and robot.navigator.goal),
             }
             for robot in self.robots
         ]

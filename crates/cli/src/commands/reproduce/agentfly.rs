@@ -103,7 +103,6 @@ fn fleet_job(file: &Path) -> FleetJob {
         out: None,
         replace: false,
         packets: false,
-        publish: None,
     }
 }
 

@@ -5,7 +5,6 @@
 
 use super::DriveVelocity;
 use super::grid::{BodyGrid, Pose2};
-use super::navigator::NavigatorOrder;
 use super::plan::MotionPlan;
 use crate::decide::Contact;
 use crate::effector::Side;
@@ -77,8 +76,6 @@ pub struct ActionOutcome {
 pub enum ActionProgress {
     /// The robot is to move so.
     UnderWay(DriveVelocity),
-    /// A navigator is to move it.
-    Navigating(NavigatorOrder),
     /// It is over, and the robot is to stand.
     Done(ActionOutcome),
 }

@@ -5,10 +5,9 @@ use super::beacon::DriveBeacon;
 use super::controller::{ActionOutcome, ActionProgress, Controller, DriveLimits, DriveState};
 use super::grid::{BodyGrid, GridLocalizer, Pose2};
 use super::guard::{Guard, GuardCause, GuardCounts, GuardLimits, GuardView};
-use super::navigator::{NavigatorAction, NavigatorLimits, NavigatorOrder};
 use super::neighbors::Neighbors;
 use super::percept::{PerceptBuilder, RobotSituation};
-use super::plan::{ActionPlanner, GridMotion, MotionPlan};
+use super::plan::{ActionPlanner, GridMotion};
 use super::plan_executor::{PlanExecutor, PlanHold, PlanOrder};
 use super::scan::RangeScan;
 use super::team_plan::TeamPlan;
@@ -126,10 +125,6 @@ pub struct Driver {
     percepts: PerceptBuilder,
     planner: ActionPlanner,
     limits: DriveLimits,
-    /// Those of the navigator that moves the robot, if one does.
-    navigator: Option<NavigatorLimits>,
-    /// Number of the last goal of the navigator.
-    goal_number: u32,
     guard: Guard,
     /// The kind of what stops the robot where the map has nothing.
     robot_kind: u8,
@@ -166,46 +161,14 @@ enum Turn {
 #[derive(Debug)]
 struct PresentAction {
     action: ActionId,
-    motion: ActionMotion,
-}
-
-/// What moves the robot in an action.
-#[derive(Debug)]
-enum ActionMotion {
-    Controller(Controller),
-    Navigator(NavigatorAction),
-}
-
-impl ActionMotion {
-    fn update(&mut self, state: &DriveState) -> ActionProgress {
-        match self {
-            Self::Controller(controller) => controller.update(state),
-            Self::Navigator(action) => action.update(state),
-        }
-    }
-
-    fn plan(&self) -> &MotionPlan {
-        match self {
-            Self::Controller(controller) => controller.plan(),
-            Self::Navigator(action) => action.plan(),
-        }
-    }
-
-    fn duration_s(&self) -> f64 {
-        match self {
-            Self::Controller(controller) => controller.duration_s(),
-            Self::Navigator(action) => action.duration_s(),
-        }
-    }
+    controller: Controller,
 }
 
 /// What a step of a drive has brought.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveStep {
-    /// The velocity that the robot is to have, after the guard; zero where a navigator moves it.
+    /// The velocity that the robot is to have, after the guard.
     pub velocity: DriveVelocity,
-    /// What a navigator is to do, if one moves the robot.
-    pub order: NavigatorOrder,
     /// The action that is over.
     pub ended: Option<DrivenAction>,
     /// Why the guard steps in, if it does.
@@ -290,8 +253,6 @@ impl Driver {
             percepts,
             planner,
             limits,
-            navigator: None,
-            goal_number: 0,
             robot_kind: world.type_of(id).kind,
             present: None,
             cycle: 0,
@@ -306,17 +267,6 @@ impl Driver {
             hold: None,
             has_closed: false,
         })
-    }
-
-    /// Returns the same driver, for a robot that a navigator moves: its steps have orders for that, and no velocities.
-    #[must_use]
-    pub fn with_navigator(self, limits: NavigatorLimits) -> Self {
-        Self { navigator: Some(limits), ..self }
-    }
-
-    /// Returns whether a navigator moves the robot.
-    pub fn has_navigator(&self) -> bool {
-        self.navigator.is_some()
     }
 
     /// Takes what another robot tells of itself, in place of what it told before.
@@ -414,12 +364,8 @@ impl Driver {
         };
         let mut ended = None;
         if let Some(present) = &mut self.present {
-            match present.motion.update(state) {
+            match present.controller.update(state) {
                 ActionProgress::UnderWay(wanted) => return Ok(self.guarded(wanted, None, &view)),
-                ActionProgress::Navigating(order) => {
-                    let step = self.guarded(DriveVelocity::ZERO, None, &view);
-                    return Ok(with_order(step, order));
-                }
                 ActionProgress::Done(outcome) => ended = self.end_action(outcome, at),
             }
         }
@@ -479,12 +425,7 @@ impl Driver {
         view: &GuardView<'_>,
     ) -> DriveStep {
         let velocity = self.guard.limit(wanted, view);
-        let guarded_by = self.guard.cause();
-        // A navigator would go on with the goal of an action that has taken too long, or that something has stopped.
-        let is_given_up = |action: &DrivenAction| action.is_timed_out || action.contact.is_some();
-        let has_to_stand = guarded_by.is_some() || ended.as_ref().is_some_and(is_given_up);
-        let order = if has_to_stand { NavigatorOrder::Stop } else { NavigatorOrder::Keep };
-        DriveStep { velocity, order, ended, guarded_by }
+        DriveStep { velocity, ended, guarded_by: self.guard.cause() }
     }
 
     fn end_action(&mut self, outcome: ActionOutcome, end: GridPose) -> Option<DrivenAction> {
@@ -497,14 +438,11 @@ impl Driver {
             cycle: self.cycle,
             action: present.action,
             end,
-            motion: GridMotion::between(present.motion.plan().start, end),
+            motion: GridMotion::between(present.controller.plan().start, end),
             contact: outcome.contact,
             is_timed_out: outcome.is_timed_out,
-            duration_s: present.motion.duration_s(),
+            duration_s: present.controller.duration_s(),
         };
-        if let ActionMotion::Navigator(action) = &present.motion {
-            self.goal_number = action.number();
-        }
         self.cycle += 1;
         Some(driven)
     }
@@ -547,29 +485,8 @@ impl Driver {
     ) -> Result<(), String> {
         let action = self.decide(state, scan, at)?;
         let plan = self.planner.plan(action, at);
-        let motion = match self.navigator {
-            None => ActionMotion::Controller(Controller::start(
-                self.limits,
-                &self.grid,
-                plan,
-                state,
-                self.robot_kind,
-            )),
-            Some(limits) => ActionMotion::Navigator(NavigatorAction::start(
-                limits,
-                &self.grid,
-                plan,
-                state,
-                self.robot_kind,
-                self.goal_number + 1,
-            )),
-        };
-        self.present = Some(PresentAction { action, motion });
+        let controller = Controller::start(self.limits, &self.grid, plan, state, self.robot_kind);
+        self.present = Some(PresentAction { action, controller });
         Ok(())
     }
-}
-
-/// Returns a step with an order of its action, unless the guard has stepped in.
-fn with_order(step: DriveStep, order: NavigatorOrder) -> DriveStep {
-    if step.guarded_by.is_some() { step } else { DriveStep { order, ..step } }
 }

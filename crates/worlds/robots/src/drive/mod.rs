@@ -10,7 +10,6 @@
 //! percept.rs     the readings of the scenario's sensors by such ranges
 //! plan.rs        where an action is meant to end
 //! controller.rs  velocities that lead there: turn, go, stop; and contacts on the way
-//! navigator.rs   the same where a navigator finds the way, and is only told where an action ends
 //! guard.rs       limits that hold whatever the program decides
 //! beacon.rs      what a robot tells the others
 //! neighbors.rs   words and requests that it hears of them
@@ -24,7 +23,6 @@ pub mod controller;
 pub mod driver;
 pub mod grid;
 pub mod guard;
-pub mod navigator;
 pub mod neighbors;
 pub mod percept;
 pub mod plan;
